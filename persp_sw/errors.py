@@ -1,0 +1,37 @@
+"""Errors a user can mend: what is wrong, what was given, what to do."""
+
+
+class PerspSWError(Exception):
+    """Base of every error this program raises on purpose; the command line exits with 2 on it."""
+
+
+class VolumeError(PerspSWError):
+    """An array, spacing or pose that cannot be a volume."""
+
+
+class FileError(PerspSWError):
+    """A file that is missing, truncated, of the wrong kind or not supported."""
+
+
+class TransferFunctionError(PerspSWError):
+    """Control points that do not make a transfer function."""
+
+
+class ViewError(PerspSWError):
+    """An eye, wall or view that cannot be rendered."""
+
+
+class EyeInsideVolumeError(ViewError):
+    """The eye stands inside the visible part of the volume, which this version cannot render."""
+
+
+class SettingsError(PerspSWError):
+    """A setting outside its range."""
+
+
+class SceneError(PerspSWError):
+    """A scene file with problems; the message lists all of them."""
+
+
+class MissingPackageError(PerspSWError):
+    """An optional package is needed; the message says which extra brings it."""

@@ -1,0 +1,187 @@
+"""Eye, wall and view: where one looks from and what one looks through."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..arrays import Matrix, Points, Vector, vector
+from ..errors import ViewError
+
+
+@dataclass(frozen=True, eq=False)
+class Eye:
+    """A point in the world from which rays start.
+
+    Parameters
+    ----------
+    position
+        World xyz.
+    near
+        Nothing nearer to the eye than this, measured along the ray in world units, is shown (≥ 0).
+    """
+
+    position: Vector
+    near: float = 0.0
+
+    def __post_init__(self):
+        object.__setattr__(self, "position", vector(self.position, "the eye's position", ViewError))
+        if not (np.isfinite(self.near) and self.near >= 0):
+            raise ViewError(f"the near distance must be a number ≥ 0; given {self.near!r}")
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """A flat rectangular (or sheared) display in the world.
+
+    Parameters
+    ----------
+    lower_left, lower_right, upper_left
+        World xyz of three corners.
+    pixels
+        Width and height in pixels. Pixel (column, row) has its centre at (column + 0.5, row + 0.5); row 0 is
+        on top.
+
+    Source: Kooima, *Generalized perspective projection* (three corners, any orientation).
+    """
+
+    lower_left: Vector
+    lower_right: Vector
+    upper_left: Vector
+    pixels: tuple[int, int]
+    name: str = ""
+
+    def __post_init__(self):
+        for corner in ("lower_left", "lower_right", "upper_left"):
+            object.__setattr__(self, corner, vector(getattr(self, corner), f"the wall's {corner}", ViewError))
+        try:
+            width, height = (int(n) for n in self.pixels)
+            whole = (width, height) == tuple(self.pixels)
+        except (TypeError, ValueError):
+            raise ViewError(f"a wall's pixels are [width, height]; given {self.pixels!r}") from None
+        if not whole or not (1 <= width <= 16384 and 1 <= height <= 16384):
+            raise ViewError(f"a wall has 1 … 16384 whole pixels a side; given {self.pixels!r}")
+        object.__setattr__(self, "pixels", (width, height))
+        across, up = self.lower_right - self.lower_left, self.upper_left - self.lower_left
+        if np.linalg.norm(np.cross(across, up)) <= 1e-9 * np.linalg.norm(across) * np.linalg.norm(up):
+            raise ViewError("a wall's three corners must not lie on one line")
+
+    @property
+    def world_from_pixel(self) -> Matrix:
+        """(3, 3): maps (column, row, 1) to world xyz on the wall; columns per pixel, rows downwards."""
+        width, height = self.pixels
+        across = (self.lower_right - self.lower_left) / width
+        down = (self.lower_left - self.upper_left) / height
+        return np.column_stack([across, down, self.upper_left])
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One eye looking through one wall: all that a picture depends on besides the scene.
+
+    Attributes
+    ----------
+    direction_from_pixel
+        (3, 3): the world direction (not normalised) of the ray through pixel point (column, row, 1) starts at
+        the eye and reaches the wall at length 1. Linear in the pixel: this is the whole projection.
+    """
+
+    eye: Eye
+    wall: Wall
+    direction_from_pixel: Matrix = field(init=False)
+
+    def __post_init__(self):
+        matrix = self.wall.world_from_pixel
+        matrix[:, 2] -= self.eye.position
+        scale = np.prod(np.linalg.norm(matrix, axis=0))
+        if abs(np.linalg.det(matrix)) <= 1e-12 * scale:
+            raise ViewError(
+                f"the eye {self.eye.position.tolist()} lies in the plane of wall {self.wall.name!r}: "
+                "it sees the wall edge-on; move the eye off the wall"
+            )
+        object.__setattr__(self, "direction_from_pixel", matrix)
+
+    @classmethod
+    def through_wall(cls, eye: Eye | Vector, wall: Wall) -> View:
+        """The view of `eye` through `wall`; `eye` may be given as its position alone."""
+        return cls(eye if isinstance(eye, Eye) else Eye(eye), wall)
+
+    @classmethod
+    def look_at(
+        cls,
+        eye: Vector,
+        centre: Vector,
+        up: Vector,
+        fovy_deg: float,
+        size: tuple[int, int],
+        near: float = 0.0,
+    ) -> View:
+        """A symmetric perspective view, as of a camera.
+
+        Parameters
+        ----------
+        eye, centre, up
+            World xyz: where the camera stands, the point in the middle of the picture, the direction upwards.
+        fovy_deg
+            Full vertical opening angle, degrees, 0 < fovy < 180. Pixels are square.
+        size
+            Width and height of the picture in pixels.
+
+        Raises
+        ------
+        ViewError
+            Eye and centre coincide, `up` is parallel to the line of sight, or a number out of range.
+        """
+        position = vector(eye, "the eye's position", ViewError)
+        forward = vector(centre, "the view's centre", ViewError) - position
+        up = vector(up, "the up direction", ViewError)
+        if not (np.isfinite(fovy_deg) and 0 < fovy_deg < 180):
+            raise ViewError(f"fovy must lie between 0 and 180 degrees; given {fovy_deg!r}")
+        distance = np.linalg.norm(forward)
+        if distance == 0:
+            raise ViewError(f"eye and centre are the same point {position.tolist()}; move one of them")
+        forward /= distance
+        right = np.cross(forward, up)
+        if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
+            raise ViewError(f"up {up.tolist()} is parallel to the line of sight; choose another up")
+        right /= np.linalg.norm(right)
+        up = np.cross(right, forward)
+        # The wall stands at the centre, so that its size and the scene's are alike whatever the unit.
+        half_height = distance * np.tan(np.radians(fovy_deg) / 2)
+        half_width = half_height * size[0] / size[1]
+        middle = position + forward * distance
+        corner = [
+            middle + sx * half_width * right + sy * half_height * up
+            for sx, sy in ((-1, -1), (1, -1), (-1, 1))
+        ]
+        return cls(Eye(position, near), Wall(*corner, pixels=size))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.wall.pixels
+
+    @property
+    def viewport_from_world(self) -> Matrix:
+        """(3, 4): world xyz1 to homogeneous pixel coordinates; w is > 0 in front of the eye.
+
+        The point's ray meets the wall at (x / w, y / w); w grows linearly with the distance from the wall's
+        parallel plane through the eye and is 1 on the wall.
+        """
+        inverse = np.linalg.inv(self.direction_from_pixel)
+        return np.column_stack([inverse, -inverse @ self.eye.position])
+
+    def project(self, points: Points) -> Points:
+        """Pixel coordinates (..., 2) of world points (..., 3); NaN for points not in front of the eye."""
+        matrix = self.viewport_from_world
+        homogeneous = np.asarray(points, np.float64) @ matrix[:, :3].T + matrix[:, 3]
+        w = homogeneous[..., 2:]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(w > 0, homogeneous[..., :2] / w, np.nan)
+
+    def directions(self) -> Points:
+        """(height, width, 3) world directions of all pixel centres' rays, reaching the wall at length 1."""
+        width, height = self.size
+        column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+        return np.stack([column, row, np.ones_like(row)], -1) @ self.direction_from_pixel.T
