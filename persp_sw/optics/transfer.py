@@ -146,7 +146,8 @@ def _check_points(rows: NDArray[np.float64]) -> None:
     if (steps < 0).any():
         bad = int(np.argmax(steps < 0)) + 1
         raise TransferFunctionError(
-            f"control points must be sorted by value: {rows[bad, 0]:g} (point {bad}) follows {rows[bad - 1, 0]:g}"
+            f"control points must be sorted by value: point {bad} at {rows[bad, 0]:g} "
+            f"follows {rows[bad - 1, 0]:g}"
         )
     if ((steps[1:] == 0) & (steps[:-1] == 0)).any():
         raise TransferFunctionError(

@@ -1,0 +1,62 @@
+"""What the user may choose about speed and accuracy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._jit import max_threads
+from .errors import SettingsError
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Speed and accuracy; none of them changes the look, only the error.
+
+    Parameters
+    ----------
+    quality
+        Pixels of the intermediate image per pixel that the view or the volume asks for, 0.05 … 8.
+        1: one pixel a voxel on the nearest visible slice, or fewer where the walls cannot show so many.
+    samples_per_interval
+        Samples along the ray in one slice interval: 1, 2 or 4. Steep rays take more on their own.
+    residual
+        A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
+    single_face_tangent
+        One face of the eye image serves while no ray is steeper against it than this tangent, 1 … 8.
+    skip_empty
+        Leave out what the transfer function makes invisible. Changes no pixel; off only for measuring.
+    max_intermediate
+        Largest width and height of a face, pixels.
+    threads
+        Threads to composite and warp with; None: all cores.
+
+    Raises
+    ------
+    SettingsError
+        A number outside its range.
+    """
+
+    quality: float = 1.0
+    samples_per_interval: int = 1
+    residual: float = 0.005
+    single_face_tangent: float = 3.0
+    skip_empty: bool = True
+    max_intermediate: int = 4096
+    threads: int | None = None
+
+    def __post_init__(self):
+        _check("quality", self.quality, 0.05, 8)
+        _check("residual", self.residual, 0, 0.5)
+        _check("single_face_tangent", self.single_face_tangent, 1, 8)
+        _check("max_intermediate", self.max_intermediate, 16, 16384)
+        if self.samples_per_interval not in (1, 2, 4):
+            raise SettingsError(f"samples_per_interval is 1, 2 or 4; given {self.samples_per_interval!r}")
+        if self.threads is not None:
+            _check("threads", self.threads, 1, max_threads())
+
+
+def _check(name: str, value: float, low: float, high: float) -> None:
+    if not (isinstance(value, (int, float, np.number)) and low <= value <= high):
+        raise SettingsError(f"{name} lies between {low:g} and {high:g}; given {value!r}")
