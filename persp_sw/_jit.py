@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import tempfile
+import time
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parent
@@ -17,7 +18,7 @@ _PACKAGE = Path(__file__).parent
 
 def _sources_hash() -> str:
     digest = hashlib.sha256()
-    for path in sorted([*_PACKAGE.glob("kernels/*.py"), _PACKAGE / "reference.py", Path(__file__)]):
+    for path in sorted([*_PACKAGE.glob("kernels/*.py"), *_PACKAGE.glob("reference.py"), Path(__file__)]):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -42,9 +43,21 @@ numba.config.THREADING_LAYER = "omp"
 
 from llvmlite import ir  # noqa: E402
 from numba import prange, types  # noqa: E402
+from numba.core import event  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
 
-__all__ = ["kernel", "max_threads", "parallel_kernel", "popcount", "prange", "set_threads", "trailing_zeros"]
+__all__ = [
+    "bits_from_float",
+    "compile_seconds",
+    "float_from_bits",
+    "kernel",
+    "max_threads",
+    "parallel_kernel",
+    "popcount",
+    "prange",
+    "set_threads",
+    "trailing_zeros",
+]
 
 # No fast-math: NaN marks voxels that are not there and must stay NaN. `contract` lets a*b + c fuse.
 _OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract"}, "error_model": "numpy"}
@@ -71,6 +84,54 @@ def trailing_zeros(_context, word):
         return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 0))
 
     return types.uint64(types.uint64), build
+
+
+@intrinsic
+def bits_from_float(_context, number):
+    """The bits of a float32 as int32."""
+
+    def build(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], ir.IntType(32))
+
+    return types.int32(types.float32), build
+
+
+@intrinsic
+def float_from_bits(_context, bits):
+    """The float32 that has these int32 bits."""
+
+    def build(context, builder, signature, arguments):
+        return builder.bitcast(arguments[0], ir.FloatType())
+
+    return types.float32(types.int32), build
+
+
+class _CompileClock(event.Listener):
+    """Seconds that numba spent compiling; nested compilations are counted once."""
+
+    def __init__(self):
+        self.seconds = 0.0
+        self._depth = 0
+        self._start = 0.0
+
+    def on_start(self, event):
+        if self._depth == 0:
+            self._start = time.perf_counter()
+        self._depth += 1
+
+    def on_end(self, event):
+        self._depth -= 1
+        if self._depth == 0:
+            self.seconds += time.perf_counter() - self._start
+
+
+_clock = _CompileClock()
+event.register("numba:compile", _clock)
+
+
+def compile_seconds() -> float:
+    """Seconds spent compiling kernels so far; loading them from disk is not compiling."""
+    return _clock.seconds
 
 
 def max_threads() -> int:

@@ -1,0 +1,214 @@
+"""Eye + volume + optics → eye image."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _jit
+from .arrays import Image, Matrix
+from .errors import EyeInsideVolumeError, ViewError
+from .geometry.faces import EyeGeometry, Face, plan_faces
+from .geometry.regions import Regions
+from .geometry.view import Eye, View, Wall
+from .kernels.composite import composite as composite_face
+from .optics.classification import Classification
+from .settings import Settings
+from .volume.levels import STANDARD_AXES
+from .volume.runs import RunStore
+
+
+@dataclass(frozen=True, eq=False)
+class EyeImage:
+    """What one eye sees of the volume, whatever the walls: one image for each principal direction in use.
+
+    Attributes
+    ----------
+    eye
+        The eye it was composited for.
+    world_from_object
+        The volume's pose, (4, 4).
+    faces
+        Geometry of each face; `face_pixels(n)` are the pixels of face n.
+    pixels
+        (total, 4) float32 linear premultiplied RGBA: the faces' pixels one after the other, row by row.
+    samples
+        Voxel samples taken to make it.
+    """
+
+    eye: Eye
+    world_from_object: Matrix
+    faces: tuple[Face, ...]
+    pixels: NDArray[np.float32]
+    samples: int
+
+    def offset(self, number: int) -> int:
+        """Where face `number` begins in `pixels`."""
+        return sum(face.size[0] * face.size[1] for face in self.faces[:number])
+
+    def face_pixels(self, number: int) -> Image:
+        """(height, width, 4) view of face `number`; row v grows with t_j, column u with t_i."""
+        width, height = self.faces[number].size
+        start = self.offset(number)
+        return self.pixels[start : start + width * height].reshape(height, width, 4)
+
+    def world_from_tangents(self, number: int) -> Matrix:
+        """(3, 3): world direction of the ray (t_i, t_j, 1) of face `number`; the ray starts at the eye.
+
+        A quad with its corners at eye + world_from_tangents · (t_i, t_j, 1)·D shows the face, for any D > 0.
+        """
+        face = self.faces[number]
+        matrix = self.world_from_object[:3, list(STANDARD_AXES[face.axis])].copy()
+        matrix[:, 2] *= face.sign
+        return matrix
+
+    def to_bytes(self) -> bytes:
+        """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""
+        table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size) for f in self.faces]
+        buffer = io.BytesIO()
+        np.savez(
+            buffer,
+            eye=np.array([*self.eye.position, self.eye.near]),
+            world_from_object=self.world_from_object,
+            faces=np.array(table, np.float64).reshape(-1, 7),
+            pixels=self.pixels,
+            samples=np.int64(self.samples),
+        )
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> EyeImage:
+        """Inverse of `to_bytes`; ViewError if the bytes are something else."""
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as file:
+                faces = tuple(
+                    Face(int(a), int(s), (t_i, t_j), pitch, (int(w), int(h)))
+                    for a, s, t_i, t_j, pitch, w, h in file["faces"].tolist()
+                )
+                *position, near = file["eye"].tolist()
+                image = cls(
+                    Eye(position, near),
+                    file["world_from_object"],
+                    faces,
+                    file["pixels"],
+                    int(file["samples"]),
+                )
+        except (OSError, EOFError, ValueError, KeyError) as error:
+            raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
+        if image.offset(len(faces)) != len(image.pixels):
+            raise ViewError("this eye image's faces do not fit its pixels; it was damaged on the way")
+        return image
+
+
+def composite_eye(
+    store: RunStore,
+    classification: Classification,
+    regions: Regions,
+    settings: Settings,
+    eye: Eye,
+    walls: Sequence[Wall],
+) -> EyeImage:
+    """The eye image that all of `walls` need; no faces where no wall shows anything visible.
+
+    Raises
+    ------
+    EyeInsideVolumeError
+        The eye is in the box of what can be seen.
+    """
+    volume = store.volume
+    pose = volume.world_from_object
+    object_from_world = np.linalg.inv(pose)
+    eye_object = object_from_world[:3, :3] @ eye.position + object_from_world[:3, 3]
+    seen = _seen_box(store, regions)
+    faces: list[Face] = []
+    if seen is not None:
+        low, high = seen
+        if (eye_object >= low).all() and (eye_object <= high).all():
+            raise EyeInsideVolumeError(
+                f"the eye {eye.position.tolist()} is inside the visible part of the volume (voxel "
+                f"{np.round(eye_object, 2).tolist()} in {low.tolist()} … {high.tolist()}); views from inside "
+                "are not available yet: move the eye out, or crop the volume"
+            )
+        views = [View(eye, wall) for wall in walls]
+        geometry = EyeGeometry(eye_object, low, high, views, object_from_world[:3, :3])
+        faces = plan_faces(
+            geometry,
+            quality=settings.quality,
+            single_face_tangent=settings.single_face_tangent,
+            max_size=settings.max_intermediate,
+        )
+    image = EyeImage(
+        eye, pose, tuple(faces), np.empty((sum(f.size[0] * f.size[1] for f in faces), 4), np.float32), 0
+    )
+    threads = settings.threads or _jit.max_threads()
+    samples = 0
+    for number, face in enumerate(faces):
+        pixels = image.face_pixels(number)
+        samples += _composite(
+            store, classification, regions, settings, eye, eye_object, face, threads, pixels
+        )
+    object.__setattr__(image, "samples", samples)
+    return image
+
+
+def _seen_box(store: RunStore, regions: Regions) -> tuple[NDArray, NDArray] | None:
+    """Object-space corners of what is neither cropped away nor transparent; None if nothing is left."""
+    low, high = regions.box(store.volume)
+    visible = store.visible_box() if (high - low > 0).all() else None
+    if visible is None:
+        return None
+    low, high = np.maximum(low, visible[0]), np.minimum(high, visible[1])
+    return (low, high) if (low <= high).all() else None
+
+
+def _composite(
+    store: RunStore,
+    classification: Classification,
+    regions: Regions,
+    settings: Settings,
+    eye: Eye,
+    eye_object: NDArray[np.float64],
+    face: Face,
+    threads: int,
+    out: Image,
+) -> int:
+    """Composite one face into `out`; returns the samples taken."""
+    volume = store.volume
+    axes = list(STANDARD_AXES[face.axis])
+    per_interval = face.samples_per_interval(settings.samples_per_interval)
+    runs = store.axis(face.axis, pairs=per_interval > 1)
+    low, high = (corner[axes] for corner in regions.box(volume))
+    standard_eye = eye_object[axes]
+    linear = volume.world_from_object[:3, axes]
+    base = max(face.sign * ((low if face.sign > 0 else high)[2] - standard_eye[2]), 0.0)
+    geometry = np.array(
+        [*standard_eye, face.sign, *face.origin, face.pitch, base, settings.samples_per_interval, eye.near]
+    )
+    half_spaces = regions.half_spaces(volume)[:, [*axes, 3]]
+    samples = np.zeros(out.shape[0], np.int64)
+    _jit.set_threads(threads)
+    composite_face(
+        geometry,
+        linear.T @ linear,
+        np.column_stack([low, high]).ravel(),
+        np.ascontiguousarray(half_spaces),
+        runs.size[2],
+        per_interval,
+        runs.visible,
+        runs.pairs,
+        runs.needed,
+        runs.offsets,
+        runs.voxels,
+        classification.table,
+        np.float32(classification.origin),
+        np.float32(classification.scale),
+        np.float32(settings.residual),
+        threads,
+        samples,
+        out,
+    )
+    return int(samples.sum())

@@ -1,0 +1,259 @@
+"""Which faces an eye image needs, and which rectangle of tangents at which pitch each of them covers.
+
+See DESIGN section 3 in `docs/design.md`. Everything is in object (voxel index) space relative to the eye: the
+rays do not know about walls, and a wall only bounds the rays that matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..arrays import Matrix
+from ..volume.levels import STANDARD_AXES
+from .view import View
+
+# Rays steeper than this take more samples in an interval (DESIGN section 3: ⌈|t| / 1.5⌉ samples).
+STEEP = 1.5
+# Part of a wall's pixels that may be finer than the pitch asked for: at grazing angles a few are 30× finer.
+_QUANTILE = 0.1
+# Points a side of the grid on which a wall's pixel size is measured.
+_GRID = 24
+# Packets are 16 pixels wide; see kernels/composite.py.
+_WIDTH_STEP = 16
+
+
+@dataclass(frozen=True)
+class Face:
+    """A rectangle of rays of one principal direction.
+
+    Attributes
+    ----------
+    axis, sign
+        Principal axis k (0 x, 1 y, 2 z) and the direction along it, −1 or +1.
+    origin
+        Tangents (t_i, t_j) of the corner of pixel (0, 0). Pixel (u, v) is the ray with tangents
+        origin + (u + ½, v + ½)·pitch, whose direction in standard space is (t_i, t_j, sign).
+    pitch
+        Distance of neighbouring pixels in tangents.
+    size
+        Width (a multiple of 16) and height in pixels.
+    """
+
+    axis: int
+    sign: int
+    origin: tuple[float, float]
+    pitch: float
+    size: tuple[int, int]
+
+    @property
+    def steepest(self) -> float:
+        """Largest |tangent| in the rectangle."""
+        ends = [(t, t + n * self.pitch) for t, n in zip(self.origin, self.size, strict=True)]
+        return max(abs(t) for pair in ends for t in pair)
+
+    def samples_per_interval(self, least: int) -> int:
+        """Samples that the steepest ray takes in a slice interval, a power of two from `least` to 4."""
+        return max(least, 4 if self.steepest > 2 * STEEP else 2 if self.steepest > STEEP else 1)
+
+
+@dataclass(frozen=True, eq=False)
+class EyeGeometry:
+    """What the choice of faces depends on.
+
+    Attributes
+    ----------
+    eye
+        Object-space position.
+    low, high
+        Object-space corners of the box that holds all that can be seen.
+    views
+        The walls through which this eye looks.
+    object_from_world
+        Linear part, (3, 3).
+    """
+
+    eye: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    views: Sequence[View]
+    object_from_world: Matrix
+
+
+def plan_faces(
+    geometry: EyeGeometry, *, quality: float, single_face_tangent: float, max_size: int
+) -> list[Face]:
+    """The faces that hold a ray which meets the box and some wall's frustum; none if no ray does.
+
+    One face serves while no such ray has a tangent beyond `single_face_tangent` in it; else several do, each
+    limited to its own rays (largest |component|).
+    """
+    polygons = [p for view in geometry.views for p in _seen_polygons(geometry, view)]
+    if not polygons:
+        return []
+    points = np.concatenate(polygons)
+    single = _single_face(points, single_face_tangent)
+    if single is not None:
+        parts = {single: points}
+    else:
+        parts = {}
+        for axis in range(3):
+            for sign in (-1, 1):
+                own = [_clip(polygon, _pyramid(axis, sign)) for polygon in polygons]
+                own = [polygon for polygon in own if len(polygon)]
+                if own:
+                    parts[axis, sign] = np.concatenate(own)
+    limit = np.inf if single is not None else 1.0
+    return [
+        _face(geometry, axis, sign, part, limit, quality, max_size) for (axis, sign), part in parts.items()
+    ]
+
+
+def tangents(points: NDArray[np.float64], axis: int, sign: int) -> NDArray[np.float64]:
+    """(..., 3): tangents t_i, t_j and distance D of directions or of points relative to the eye."""
+    i, j, k = STANDARD_AXES[axis]
+    distance = sign * points[..., k]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.stack([points[..., i] / distance, points[..., j] / distance, distance], -1)
+
+
+def _seen_polygons(geometry: EyeGeometry, view: View) -> list[NDArray[np.float64]]:
+    """The box's sides, relative to the eye, clipped to the view's frustum."""
+    width, height = view.size
+    matrix = geometry.object_from_world @ view.direction_from_pixel
+    corners = (matrix @ np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1]]).T).T
+    normals = np.cross(corners, np.roll(corners, -1, axis=0))
+    middle = matrix @ (width / 2, height / 2, 1)
+    normals *= np.sign(normals @ middle)[:, None]  # inwards, whatever the pose's handedness
+    low, high = geometry.low - geometry.eye, geometry.high - geometry.eye
+    sides = [_clip(side, normals) for side in _box_sides(low, high)]
+    return [side for side in sides if len(side)]
+
+
+def _box_sides(low: NDArray[np.float64], high: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    sides = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for end in (low, high):
+            side = np.empty((4, 3))
+            side[:, axis] = end[axis]
+            side[:, u] = low[u], high[u], high[u], low[u]
+            side[:, v] = low[v], low[v], high[v], high[v]
+            sides.append(side)
+    return sides
+
+
+def _clip(polygon: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The part of a convex polygon where n·p ≥ 0 for all normals (Sutherland, Hodgman 1974)."""
+    for normal in normals:
+        inside = polygon @ normal
+        kept = []
+        for a, b, da, db in zip(
+            polygon, np.roll(polygon, -1, axis=0), inside, np.roll(inside, -1), strict=True
+        ):
+            if da >= 0:
+                kept.append(a)
+            if (da >= 0) != (db >= 0):
+                kept.append(a + (b - a) * (da / (da - db)))
+        if not kept:
+            return np.empty((0, 3))
+        polygon = np.array(kept)
+    return polygon
+
+
+def _pyramid(axis: int, sign: int) -> NDArray[np.float64]:
+    """Inward normals of the rays whose largest component is `sign` along `axis`."""
+    normals = np.zeros((4, 3))
+    normals[:, axis] = sign
+    normals[:2, (axis + 1) % 3] = -1, 1
+    normals[2:, (axis + 2) % 3] = -1, 1
+    return normals
+
+
+def _single_face(points: NDArray[np.float64], limit: float) -> tuple[int, int] | None:
+    """The direction in which all points lie in front with the smallest largest tangent, if below `limit`."""
+    best, best_tangent = None, limit
+    for axis in range(3):
+        for sign in (-1, 1):
+            t_i, t_j, distance = tangents(points, axis, sign).T
+            if distance.min() > 0:
+                steepest = max(np.abs(t_i).max(), np.abs(t_j).max())
+                if steepest <= best_tangent:
+                    best, best_tangent = (axis, sign), steepest
+    return best
+
+
+def _face(
+    geometry: EyeGeometry,
+    axis: int,
+    sign: int,
+    points: NDArray[np.float64],
+    limit: float,
+    quality: float,
+    max_size: int,
+) -> Face:
+    t_i, t_j, distance = tangents(points[points[:, axis] * sign > 0], axis, sign).T
+    low = np.clip([t_i.min(), t_j.min()], -limit, limit)
+    high = np.clip([t_i.max(), t_j.max()], -limit, limit)
+    pitch = max(_volume_pitch(distance), _wall_pitch(geometry, axis, sign)) / quality
+    margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
+    pitch = max(pitch, (high - low).max() / (max_size - margin - 1))
+    width, height = (int(n) + margin for n in np.ceil((high - low) / pitch))
+    width = -(-width // _WIDTH_STEP) * _WIDTH_STEP
+    if width > max_size:
+        width = max_size // _WIDTH_STEP * _WIDTH_STEP
+    # Centred, so that a mirrored volume has the mirrored image.
+    origin = (low + high) / 2 - np.array([width, height]) / 2 * pitch
+    return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width, height))
+
+
+def _volume_pitch(distance: NDArray[np.float64]) -> float:
+    """One pixel a voxel on the nearest slice, but no finer than half a pixel a voxel on the farthest."""
+    return 1 / max(distance.min(), distance.max() / 2)
+
+
+def _wall_pitch(geometry: EyeGeometry, axis: int, sign: int) -> float:
+    """The finest that the walls can show of this face, in tangents; 0 where they show nothing of it."""
+    finest = [_pixel_tangent(geometry, view, axis, sign) for view in geometry.views]
+    return min((size for size in finest if size > 0), default=0.0)
+
+
+def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int) -> float:
+    """Smaller singular value of ∂t/∂pixel, at a low quantile over the pixels that show the box in this face."""
+    width, height = view.size
+    matrix = geometry.object_from_world @ view.direction_from_pixel
+    column, row = np.meshgrid(
+        (np.arange(_GRID) + 0.5) / _GRID * width, (np.arange(_GRID) + 0.5) / _GRID * height
+    )
+    directions = np.stack([column, row, np.ones_like(row)], -1).reshape(-1, 3) @ matrix.T
+    shown = _meets_box(directions, geometry.low - geometry.eye, geometry.high - geometry.eye)
+    i, j, k = STANDARD_AXES[axis]
+    shown &= directions[:, k] * sign > 0
+    if not shown.any():  # smaller than the grid: take its middle
+        directions = ((geometry.low + geometry.high) / 2 - geometry.eye)[None]
+        directions = directions / (np.linalg.inv(matrix) @ directions[0])[2]
+        if not directions[0, k] * sign > 0:
+            return 0.0
+    else:
+        directions = directions[shown]
+    along = sign * directions[:, k, None]
+    jacobian = np.stack(
+        [
+            (matrix[[i, j], axis_] - directions[:, [i, j]] * sign * matrix[k, axis_] / along) / along
+            for axis_ in (0, 1)
+        ],
+        -1,
+    )
+    return float(np.quantile(np.linalg.svd(jacobian, compute_uv=False)[:, -1], _QUANTILE))
+
+
+def _meets_box(directions: NDArray, low: NDArray, high: NDArray) -> NDArray[np.bool_]:
+    """Whether rays from the origin meet the box."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = low / directions, high / directions
+    near = np.nanmax(np.minimum(one, other), axis=1)
+    far = np.nanmin(np.maximum(one, other), axis=1)
+    return (near <= far) & (far > 0)

@@ -1,0 +1,134 @@
+"""Renderer: the one object most users need."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Any
+
+from . import _jit
+from .arrays import Image
+from .compositor import EyeImage, composite_eye
+from .geometry.regions import Regions
+from .geometry.view import Eye, View, Wall
+from .optics.classification import Classification
+from .optics.presets import choose
+from .optics.transfer import TransferFunction
+from .settings import Settings
+from .volume.grid import Volume
+from .volume.runs import EverythingVisible, RunStore
+from .warp.software import warp_eye_image
+
+_log = logging.getLogger("persp_sw")
+
+
+class Renderer:
+    """Pictures of one volume.
+
+    Parameters
+    ----------
+    volume
+        What to show.
+    transfer
+        How; None chooses a preset from the values' histogram.
+    settings
+        Speed and accuracy.
+    regions
+        Which part is shown.
+
+    All of these but the volume may be changed at any time by assigning to the attribute of that name; what
+    has to be encoded anew is, when next needed.
+
+    Attributes
+    ----------
+    runs
+        The run-length store.
+    last
+        Statistics of the last picture: `encode_ms`, `composite_ms`, `warp_ms`, `compile_ms` (numba; not in
+        the others), `faces`, `intermediate_size` (width and height of the largest face), `samples`,
+        `runs_bytes`, `threads`.
+    """
+
+    def __init__(
+        self,
+        volume: Volume,
+        transfer: TransferFunction | None = None,
+        settings: Settings | None = None,
+        regions: Regions | None = None,
+    ):
+        self.volume = volume
+        self.settings = settings or Settings()
+        self.regions = regions or Regions()
+        self.last: dict[str, Any] = {}
+        self._transfer = transfer or choose(volume).transfer
+        self._classification = Classification.of(self._transfer, volume)
+        self.runs = RunStore(volume, self._visibility())
+        self._skipping = self.settings.skip_empty
+        if min(volume.size) == 1:
+            _log.warning(
+                "%s is one voxel thick: the box of its voxel centres holds nothing, the picture is empty",
+                "×".join(map(str, volume.size)),
+            )
+
+    @property
+    def transfer(self) -> TransferFunction:
+        """The transfer function; assigning another drops what was encoded for this one."""
+        return self._transfer
+
+    @transfer.setter
+    def transfer(self, transfer: TransferFunction) -> None:
+        self._transfer = transfer
+        self._classification = Classification.of(transfer, self.volume)
+        self.runs.classify(self._visibility())
+
+    def composite(self, eye: Eye, walls: Sequence[Wall]) -> EyeImage:
+        """One eye image that serves all `walls`; ViewError where the eye cannot be served.
+
+        Cost: one compositing, whatever the number of walls; none where no wall shows anything visible.
+        """
+        if self._skipping != self.settings.skip_empty:
+            self._skipping = self.settings.skip_empty
+            self.runs.classify(self._visibility())
+        compiled, encoded = _jit.compile_seconds(), self.runs.encode_seconds
+        start = perf_counter()
+        image = composite_eye(self.runs, self._classification, self.regions, self.settings, eye, walls)
+        spent = perf_counter() - start
+        compiled, encoded = _jit.compile_seconds() - compiled, self.runs.encode_seconds - encoded
+        self.last = {
+            "encode_ms": 1e3 * encoded,
+            "composite_ms": 1e3 * max(spent - encoded - compiled, 0.0),
+            "warp_ms": 0.0,
+            "compile_ms": 1e3 * compiled,
+            "faces": len(image.faces),
+            "intermediate_size": list(
+                max((f.size for f in image.faces), key=lambda s: s[0] * s[1], default=(0, 0))
+            ),
+            "samples": image.samples,
+            "runs_bytes": self.runs.bytes,
+            "threads": self.settings.threads or _jit.max_threads(),
+        }
+        return image
+
+    def warp(self, eye_image: EyeImage, view: View) -> Image:
+        """The picture of one view from an eye image; its wall must be one the eye image was made for."""
+        compiled = _jit.compile_seconds()
+        start = perf_counter()
+        image = warp_eye_image(eye_image, view, self.settings.threads)
+        spent = perf_counter() - start
+        compiled = _jit.compile_seconds() - compiled
+        self.last["warp_ms"] = self.last.get("warp_ms", 0.0) + 1e3 * max(spent - compiled, 0.0)
+        self.last["compile_ms"] = self.last.get("compile_ms", 0.0) + 1e3 * compiled
+        return image
+
+    def render(self, view: View) -> Image:
+        """The picture of one view.
+
+        Returns
+        -------
+        (height, width, 4) float32, linear, premultiplied, row 0 on top, no background.
+        """
+        return self.warp(self.composite(view.eye, [view.wall]), view)
+
+    def _visibility(self) -> Classification | EverythingVisible:
+        return self._classification if self.settings.skip_empty else EverythingVisible()
