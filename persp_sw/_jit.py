@@ -47,13 +47,12 @@ from numba.core import event  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
 
 __all__ = [
-    "bits_from_float",
     "compile_seconds",
-    "float_from_bits",
     "kernel",
     "max_threads",
     "parallel_kernel",
     "popcount",
+    "power_of_two",
     "prange",
     "set_threads",
     "trailing_zeros",
@@ -87,23 +86,20 @@ def trailing_zeros(_context, word):
 
 
 @intrinsic
-def bits_from_float(_context, number):
-    """The bits of a float32 as int32."""
+def power_of_two(_context, shifted):
+    """2^n as float32, where `shifted` = 1.5·2^23 + n is float32 and n an integer, −126 … 127.
+
+    Integer arithmetic in numba widens to 64 bits, which halves the vectors; this stays in 32.
+    """
 
     def build(context, builder, signature, arguments):
-        return builder.bitcast(arguments[0], ir.IntType(32))
+        word = ir.IntType(32)
+        mantissa = builder.bitcast(arguments[0], word)  # its low bits are those of n
+        exponent = builder.shl(mantissa, ir.Constant(word, 23))
+        bias = ir.Constant(word, ((127 - 0x4B400000) << 23) & 0xFFFFFFFF)
+        return builder.bitcast(builder.add(exponent, bias), ir.FloatType())
 
-    return types.int32(types.float32), build
-
-
-@intrinsic
-def float_from_bits(_context, bits):
-    """The float32 that has these int32 bits."""
-
-    def build(context, builder, signature, arguments):
-        return builder.bitcast(arguments[0], ir.FloatType())
-
-    return types.float32(types.int32), build
+    return types.float32(types.float32), build
 
 
 class _CompileClock(event.Listener):

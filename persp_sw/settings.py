@@ -20,7 +20,8 @@ class Settings:
         Pixels of the intermediate image per pixel that the view or the volume asks for, 0.05 … 8.
         1: one pixel a voxel on the nearest visible slice, or fewer where the walls cannot show so many.
     samples_per_interval
-        Samples along the ray in one slice interval: 1, 2 or 4. Steep rays take more on their own.
+        Samples along the ray in one slice interval: 1, 2 or 4. None: 2 where the transfer function can become
+        opaque within an interval, else 1. Steep rays take more on their own.
     residual
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent
@@ -39,7 +40,7 @@ class Settings:
     """
 
     quality: float = 1.0
-    samples_per_interval: int = 1
+    samples_per_interval: int | None = None
     residual: float = 0.005
     single_face_tangent: float = 3.0
     skip_empty: bool = True
@@ -51,7 +52,7 @@ class Settings:
         _check("residual", self.residual, 0, 0.5)
         _check("single_face_tangent", self.single_face_tangent, 1, 8)
         _check("max_intermediate", self.max_intermediate, 16, 16384)
-        if self.samples_per_interval not in (1, 2, 4):
+        if self.samples_per_interval not in (None, 1, 2, 4):
             raise SettingsError(f"samples_per_interval is 1, 2 or 4; given {self.samples_per_interval!r}")
         if self.threads is not None:
             _check("threads", self.threads, 1, max_threads())

@@ -60,6 +60,11 @@ class Classification:
         return cls(table, seen, origin, scale)
 
     @property
+    def largest_extinction(self) -> float:
+        """Largest extinction of any entry, per world unit."""
+        return float(self.table[:, 3].max())
+
+    @property
     def is_transparent(self) -> bool:
         """Whether no entry has any extinction."""
         return bool(self.seen[-1] == 0)
