@@ -1,9 +1,71 @@
-"""Perspective shear-warp volume rendering for immersive virtual reality."""
+"""Perspective shear-warp volume rendering for immersive virtual reality.
 
-from .errors import PerspSWError
-from .geometry.view import Eye, View, Wall
-from .optics.transfer import TransferFunction
-from .volume.grid import Volume
+What is listed in `__all__` is imported when it is first used (PEP 562), so that `import persp_sw` and the
+command line start at once: numba and the file readers load only when something needs them.
+"""
 
-__all__ = ["Eye", "PerspSWError", "TransferFunction", "View", "Volume", "Wall"]
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from . import images, reference
+    from .compositor import EyeImage
+    from .errors import PerspSWError
+    from .geometry.regions import Regions
+    from .geometry.view import Eye, View, Wall
+    from .optics.transfer import TransferFunction
+    from .renderer import Renderer
+    from .scene import Scene
+    from .settings import Settings
+    from .volume.files import load
+    from .volume.grid import Volume
+
+__all__ = [
+    "Eye",
+    "EyeImage",
+    "PerspSWError",
+    "Regions",
+    "Renderer",
+    "Scene",
+    "Settings",
+    "TransferFunction",
+    "View",
+    "Volume",
+    "Wall",
+    "__version__",
+    "images",
+    "load",
+    "reference",
+]
 __version__ = "0.1.0"
+
+_HOME = {
+    "Eye": ".geometry.view",
+    "EyeImage": ".compositor",
+    "PerspSWError": ".errors",
+    "Regions": ".geometry.regions",
+    "Renderer": ".renderer",
+    "Scene": ".scene",
+    "Settings": ".settings",
+    "TransferFunction": ".optics.transfer",
+    "View": ".geometry.view",
+    "Volume": ".volume.grid",
+    "Wall": ".geometry.view",
+    "load": ".volume.files",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name in ("images", "reference"):  # modules
+        return import_module(f".{name}", __name__)
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOME[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ class EyeImage:
                     file["pixels"],
                     int(file["samples"]),
                 )
-        except (OSError, EOFError, ValueError, KeyError) as error:
+        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
             raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
         if image.offset(len(faces)) != len(image.pixels):
             raise ViewError("this eye image's faces do not fit its pixels; it was damaged on the way")

@@ -280,13 +280,13 @@ def _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges):
         )
         at_eye = a_i * e_i + a_j * e_j + a_k * e_k + a_0
         across = a_j * t_j + a_k * sign
+        parallel = -np.inf if at_eye >= 0.0 else np.inf
         for l in range(np.uint64(n)):  # noqa: E741
             slope = a_i * (t_first + np.float64(l) * pitch) + across
-            # For a parallel ray this is ±∞, which is right, or NaN in the plane, which compares as "shown".
             crossing = -at_eye / slope
             nearest = ranges[l]
             farthest = ranges[np.uint64(n) + l]
-            enters = crossing if slope > 0.0 else -crossing if slope == 0.0 else -np.inf
+            enters = crossing if slope > 0.0 else parallel if slope == 0.0 else -np.inf
             leaves = crossing if slope < 0.0 else np.inf
             ranges[l] = enters if enters > nearest else nearest
             ranges[np.uint64(n) + l] = leaves if leaves < farthest else farthest

@@ -1,0 +1,61 @@
+"""Eye images travel as bytes, and tell where their faces lie."""
+
+import numpy as np
+import pytest
+from tolerances import MATRIX
+from views import DIRECTIONS, random_pose, view_of
+
+from persp_sw import EyeImage, Renderer, TransferFunction, Volume
+from persp_sw.errors import ViewError
+
+TF = TransferFunction([(0, (1, 0.5, 0.2), 0), (255, (1, 1, 1), 0.5)], 1.0)
+
+
+@pytest.fixture
+def image(rng):
+    volume = Volume(rng.integers(0, 255, (12, 10, 11)).astype(np.uint8), world_from_object=random_pose(rng))
+    view = view_of(volume, DIRECTIONS[1], 1.0, fovy=90)
+    return Renderer(volume, TF).composite(view.eye, [view.wall])
+
+
+def test_bytes_round_trip_bit_for_bit(image):
+    other = EyeImage.from_bytes(image.to_bytes())
+    assert other.faces == image.faces
+    assert other.samples == image.samples > 0
+    assert other.eye.near == image.eye.near
+    np.testing.assert_array_equal(other.eye.position, image.eye.position)
+    np.testing.assert_array_equal(other.world_from_object, image.world_from_object)
+    assert other.pixels.dtype == np.float32
+    np.testing.assert_array_equal(other.pixels, image.pixels)
+
+
+def test_an_eye_image_without_faces_travels_too(image):
+    empty = EyeImage(image.eye, image.world_from_object, (), np.empty((0, 4), np.float32), 0)
+    other = EyeImage.from_bytes(empty.to_bytes())
+    assert other.faces == () and other.pixels.shape == (0, 4)
+
+
+@pytest.mark.parametrize("damage", [lambda b: b"", lambda b: b"hello", lambda b: b[:-40], lambda b: b[: len(b) // 2]])
+def test_damaged_bytes_are_refused_by_name(image, damage):
+    with pytest.raises(ViewError, match="eye image"):
+        EyeImage.from_bytes(damage(image.to_bytes()))
+
+
+def test_pixels_that_do_not_fit_the_faces_are_refused(image):
+    short = EyeImage(image.eye, image.world_from_object, image.faces, image.pixels[:-1], 0)
+    with pytest.raises(ViewError, match="damaged"):
+        EyeImage.from_bytes(short.to_bytes())
+
+
+def test_quad_corners_project_to_the_faces_corners(image, rng):
+    """eye + world_from_tangents · (t, 1)·D lies on the ray of t for every D: the quad is the warp."""
+    for number, face in enumerate(image.faces):
+        matrix = image.world_from_tangents(number)
+        t = np.array(face.origin) + rng.random((20, 2)) * np.array(face.size) * face.pitch
+        near, far = (image.eye.position + np.column_stack([t, np.ones(20)]) @ matrix.T * d for d in (0.5, 70))
+        inverse = np.linalg.inv(image.world_from_object[:3, :3])
+        for points in (near, far):
+            direction = (points - image.eye.position) @ inverse.T
+            along = face.sign * direction[:, face.axis]
+            i, j = (face.axis + 1) % 3, (face.axis + 2) % 3
+            np.testing.assert_allclose(direction[:, [i, j]] / along[:, None], t, atol=MATRIX * 10)

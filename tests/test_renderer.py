@@ -1,0 +1,209 @@
+"""The whole way: volume to picture against the float64 reference, and how a Renderer behaves."""
+
+import logging
+
+import numpy as np
+import pytest
+from tolerances import FLOAT32_IMAGE, PICTURE_SMOOTH_DB, PICTURE_SURFACE_DB
+from views import DIRECTIONS, random_pose, view_of
+
+from persp_sw import Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
+from persp_sw.errors import EyeInsideVolumeError, SettingsError
+from persp_sw.measure.metrics import compare, psnr
+from persp_sw.volume.phantoms import synthetic_ct
+
+SMOOTH = [(0, (0.2, 0.4, 0.9), 0), (90, (0.9, 0.6, 0.3), 0.05), (255, (1, 1, 1), 0.3)]
+SURFACE = [(0, (0, 0, 0), 0), (100, (0.9, 0.7, 0.5), 0), (130, (0.9, 0.7, 0.5), 0.9), (255, (1, 1, 1), 0.95)]
+
+
+def transfer_for(volume, points):
+    """The 8-bit control points stretched to the volume's range."""
+    low, high = volume.value_range
+    return TransferFunction([(low + v / 255 * (high - low), c, a) for v, c, a in points])
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.float32])
+def test_every_voxel_type_meets_the_reference(dtype):
+    volume = synthetic_ct(48, dtype=dtype)
+    renderer = Renderer(volume, transfer_for(volume, SMOOTH))
+    for towards in DIRECTIONS[:2]:
+        view = view_of(volume, towards, size=(64, 64))
+        result = compare(renderer.render(view), reference.render(volume, renderer.transfer, view))
+        assert result["psnr"] > PICTURE_SMOOTH_DB
+        assert abs(result["mean_signed_error"]) < 1e-3
+
+
+@pytest.mark.parametrize("points, floor", [(SMOOTH, PICTURE_SMOOTH_DB), (SURFACE, PICTURE_SURFACE_DB)])
+@pytest.mark.parametrize("kind", ["plain", "oblique", "mirrored", "sheared", "flat"])
+def test_every_side_and_pose_meets_the_reference(points, floor, kind, rng):
+    pose = {
+        "plain": np.eye(4),
+        "oblique": random_pose(rng, spacing=(1, 0.8, 1.3)),
+        "mirrored": random_pose(rng, mirrored=True),
+        "sheared": random_pose(rng, shear=0.3),
+        "flat": np.diag([1, 1, 4.0, 1]),
+    }[kind]
+    volume = Volume(synthetic_ct(40).data, world_from_object=pose)
+    renderer = Renderer(volume, TransferFunction(points))
+    for towards in DIRECTIONS:
+        view = view_of(volume, towards, size=(56, 56))
+        truth = reference.render(volume, renderer.transfer, view)
+        assert psnr(renderer.render(view), truth) > floor, towards
+
+
+def test_near_views_need_several_faces_and_meet_the_reference():
+    volume = synthetic_ct(40)
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    view = view_of(volume, DIRECTIONS[1], 0.9, fovy=100, size=(80, 80))
+    picture = renderer.render(view)
+    assert renderer.last["faces"] == 3
+    assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SMOOTH_DB
+
+
+def test_crop_and_clip_meet_the_reference():
+    volume = synthetic_ct(40)
+    regions = Regions(crop=(5, 33.5, 2.25, 39, 0, 30), clip=[(0.5, -0.3, 0.8, -15)])
+    renderer = Renderer(volume, TransferFunction(SMOOTH), regions=regions)
+    view = view_of(volume, DIRECTIONS[0], size=(64, 64))
+    truth = reference.render(volume, renderer.transfer, view, regions=regions)
+    assert psnr(renderer.render(view), truth) > PICTURE_SMOOTH_DB
+    whole = Renderer(volume, renderer.transfer)
+    whole.render(view)
+    assert renderer.last["samples"] < whole.last["samples"]
+
+
+def test_error_falls_with_quality_down_to_a_thousandth():
+    volume = synthetic_ct(32)
+    view = view_of(volume, DIRECTIONS[0], size=(96, 96))
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    truth = reference.render(volume, renderer.transfer, view)
+    errors = []
+    for quality, samples in ((0.5, 1), (1, 1), (2, 2), (4, 4)):
+        renderer.settings = Settings(quality=quality, samples_per_interval=samples, residual=0)
+        errors.append(psnr(renderer.render(view), truth))
+    assert errors == sorted(errors)
+    assert errors[-1] > 60
+
+
+@pytest.mark.parametrize("quality", [0.3, 1.0, 3.0])
+def test_quality_does_not_change_the_look(quality):
+    volume = synthetic_ct(32)
+    view = view_of(volume, DIRECTIONS[0], size=(48, 48))
+    renderer = Renderer(volume, TransferFunction(SMOOTH), Settings(quality=quality))
+    picture, truth = renderer.render(view), reference.render(volume, renderer.transfer, view)
+    np.testing.assert_allclose(picture.mean((0, 1)), truth.mean((0, 1)), rtol=0.01)
+
+
+def test_parts_and_changes_give_the_same_picture_as_a_new_renderer():
+    volume = synthetic_ct(32)
+    view = view_of(volume, DIRECTIONS[0])
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    renderer.render(view)
+    renderer.transfer = TransferFunction(SURFACE)
+    renderer.settings = Settings(quality=2)
+    renderer.regions = Regions(crop=(4, 30, 4, 30, 4, 30))
+    fresh = Renderer(volume, TransferFunction(SURFACE), Settings(quality=2), renderer.regions)
+    np.testing.assert_array_equal(renderer.render(view), fresh.render(view))
+    renderer.settings = Settings(quality=2, skip_empty=False)
+    assert np.abs(renderer.render(view) - fresh.render(view)).max() < 0.1  # another rectangle, same picture
+
+
+def test_one_compositing_serves_several_walls_and_none_costs_nothing():
+    volume = synthetic_ct(32)
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    eye = volume.centre + np.array([0, 0, 60.0])
+    front = View.look_at(eye, volume.centre, (0, 1, 0), 40, (64, 64))
+    away = View.look_at(eye, eye + (0, 0, 9), (0, 1, 0), 40, (64, 64))
+    image = renderer.composite(front.eye, [front.wall, away.wall])
+    np.testing.assert_array_equal(renderer.warp(image, front), renderer.render(front))
+    assert not renderer.warp(image, away).any()
+    assert renderer.composite(away.eye, [away.wall]).samples == 0
+    assert renderer.last["faces"] == 0 and renderer.last["intermediate_size"] == [0, 0]
+
+
+def test_an_eye_inside_has_its_own_error_and_outside_what_is_visible_is_outside():
+    data = np.zeros((40, 40, 40), np.uint8)
+    data[:, :, 25:] = 200
+    volume = Volume(data)
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    inside = View.look_at((30, 20, 20), (0, 20, 20), (0, 1, 0), 60, (32, 32))
+    with pytest.raises(EyeInsideVolumeError, match="inside the visible part"):
+        renderer.render(inside)
+    # In the empty part of the box the eye is as good as outside.
+    view = View.look_at((8, 20, 20), (39, 21, 20.5), (0, 1, 0), 60, (64, 64))
+    picture = renderer.render(view)
+    assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SURFACE_DB
+
+
+@pytest.mark.parametrize("size", [(1, 1, 1), (1, 8, 8), (8, 1, 8), (8, 8, 1)])
+def test_a_volume_one_voxel_thick_is_an_empty_picture_and_one_warning(size, caplog):
+    volume = Volume(np.full(size[::-1], 200, np.uint8))
+    with caplog.at_level(logging.WARNING, "persp_sw"):
+        renderer = Renderer(volume, TransferFunction(SMOOTH))
+        view = View.look_at((20, 18, 15), (0, 0, 0), (0, 1, 0), 45, (16, 16))
+        for _ in range(2):
+            assert not renderer.render(view).any()
+    assert len(caplog.records) == 1 and "one voxel thick" in caplog.text
+
+
+def test_invisible_volumes_and_empty_crops_cost_nothing():
+    volume = synthetic_ct(24)
+    view = view_of(volume, DIRECTIONS[0])
+    for renderer in (
+        Renderer(volume, TransferFunction([(0, (1, 1, 1), 0)])),
+        Renderer(volume, TransferFunction(SMOOTH), regions=Regions(crop=(100, 120, 0, 5, 0, 5))),
+    ):
+        assert not renderer.render(view).any()
+        assert renderer.last["samples"] == 0
+
+
+def test_voxels_that_are_nan_are_transparent_in_picture_and_reference():
+    data = synthetic_ct(40, dtype=np.float32).data.copy()
+    data[12:20, 15:22, 10:18] = np.nan
+    volume = Volume(data)
+    assert volume.nonfinite == 8 * 7 * 8
+    renderer = Renderer(volume, transfer_for(volume, SMOOTH))
+    view = view_of(volume, DIRECTIONS[0], size=(64, 64))
+    picture = renderer.render(view)
+    assert np.isfinite(picture).all()
+    # Cells (8 voxels) with a NaN corner are transparent; slices see half of such a cell as whole.
+    assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SURFACE_DB
+
+
+def test_a_marker_lands_where_it_is_projected(rng):
+    """A bright voxel's centroid, through any pose, is where the projection matrix says."""
+    data = np.zeros((21, 23, 25), np.uint8)
+    voxel = np.array([17, 6, 13])  # x, y, z
+    data[tuple(voxel[::-1])] = 255
+    for mirrored in (False, True):
+        volume = Volume(data, world_from_object=random_pose(rng, mirrored=mirrored))
+        view = view_of(volume, DIRECTIONS[0], 2.5, fovy=28, size=(200, 160))
+        picture = Renderer(volume, TransferFunction(SMOOTH), Settings(quality=4)).render(view)
+        alpha = picture[..., 3].astype(float)
+        row, column = np.indices(alpha.shape) + 0.5
+        centroid = np.array([(column * alpha).sum(), (row * alpha).sum()]) / alpha.sum()
+        world = volume.world_from_object[:3, :3] @ voxel + volume.world_from_object[:3, 3]
+        assert np.abs(centroid - view.project(world)).max() < 0.25
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [{"quality": 0}, {"quality": np.nan}, {"residual": -1}, {"samples_per_interval": 3}, {"threads": 0},
+     {"single_face_tangent": 0.5}, {"max_intermediate": 5}, {"quality": "high"}],
+)  # fmt: skip
+def test_settings_out_of_range_are_refused(wrong):
+    with pytest.raises(SettingsError, match=next(iter(wrong))):
+        Settings(**wrong)
+
+
+def test_picture_and_wall_orientation():
+    """Row 0 is on top and column 0 on the left: bright voxels at +x and +y, camera on +z, y up."""
+    data = np.zeros((9, 9, 9), np.uint8)
+    data[4, 7, 7] = 255  # z, y, x
+    volume = Volume(data)
+    picture = Renderer(volume, TransferFunction(SMOOTH)).render(view_of(volume, (0, 0, 1), 2.5, size=(64, 64)))
+    row, column = np.unravel_index(picture[..., 3].argmax(), (64, 64))
+    assert row < 32 < column
+    wall = Wall((-10, -10, 0), (10, -10, 0), (-10, 10, 0), (64, 64))
+    assert np.abs(picture[:32, 32:].sum() - picture.sum()) < FLOAT32_IMAGE
+    assert View.through_wall((0, 0, 30), wall).project([10, 10, 0]).tolist() == [64, 0]

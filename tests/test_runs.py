@@ -1,0 +1,155 @@
+"""The run-length store: decoding is exact, nothing that is needed is missing, nothing else is stored."""
+
+import numpy as np
+import pytest
+import twins
+
+from persp_sw import TransferFunction, Volume
+from persp_sw.optics.classification import Classification
+from persp_sw.volume.levels import STANDARD_AXES, BlockBounds, standard_rows
+from persp_sw.volume.runs import EverythingVisible, RunStore
+
+SHAPES = [(2, 2, 2), (5, 6, 7), (9, 40, 3), (4, 5, 270), (3, 2, 258), (2, 3, 257)]
+DTYPES = [np.uint8, np.int16, np.uint16, np.float32]
+
+
+def sparse_volume(shape, dtype, seed=0, share=0.02):
+    rng = np.random.default_rng(seed)
+    data = np.zeros(shape, dtype)
+    spots = rng.random(shape) < share
+    data[spots] = rng.integers(50, 100, spots.sum())
+    return Volume(data)
+
+
+def bump(low=40.0, high=60.0):
+    """Visible between the two values only."""
+    return TransferFunction([(low, (1, 1, 1), 0), (high - 1, (1, 1, 1), 0.5), (high, (1, 1, 1), 0)])
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_block_bounds_equal_their_twin(shape, dtype):
+    volume = sparse_volume(shape, dtype, share=0.3)
+    for axis in range(3):
+        low, high = BlockBounds(volume).of(axis)
+        expected_low, expected_high = twins.block_bounds(standard_rows(volume, axis))
+        np.testing.assert_array_equal(low, expected_low)
+        np.testing.assert_array_equal(high, expected_high)
+
+
+@pytest.mark.parametrize("pairs", [False, True])
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_exactly_the_needed_voxels_are_stored_bit_for_bit(shape, dtype, pairs):
+    volume = sparse_volume(shape, dtype)
+    classification = Classification.of(bump(), volume)
+    store = RunStore(volume, classification)
+    for axis in range(3):
+        rows = standard_rows(volume, axis)
+        runs = store.axis(axis, pairs=pairs)
+        low, high = twins.block_bounds(rows)
+        if pairs:
+            low, high = np.minimum(low[:, :-1], low[:, 1:]), np.maximum(high[:, :-1], high[:, 1:])
+        visible = twins.visible_blocks(
+            low, high, classification.table, classification.origin, classification.scale
+        )
+        expected = twins.stored_voxels(visible, rows.shape, pairs)
+        mask = runs.pairs if pairs else runs.visible
+        np.testing.assert_array_equal(twins.bits(mask, visible.shape[-1]), visible)
+        decoded, stored = runs.decode()
+        np.testing.assert_array_equal(stored, expected)
+        np.testing.assert_array_equal(decoded[stored], rows[stored])
+        assert runs.voxel_count == expected.sum()
+        # A run of blocks ends where the next block is not needed.
+        blocks = twins.bits(runs.needed, visible.shape[-1])
+        ends = blocks & ~np.pad(blocks, ((0, 0), (0, 0), (0, 1)))[..., 1:]
+        assert runs.run_count == ends.sum()
+
+
+def test_a_value_between_two_invisible_voxels_is_seen():
+    """0 beside 200 passes through the visible 50 … 100: the block is kept though no voxel is visible."""
+    data = np.zeros((4, 4, 8), np.uint8)
+    data[:, :, 4:] = 200
+    volume = Volume(data)
+    store = RunStore(volume, Classification.of(bump(50, 100), volume))
+    assert store.axis(2).voxel_count > 0
+    assert store.axis(0).voxel_count == 0  # in slices across x the values are all alike …
+    assert store.axis(0, pairs=True).voxel_count > 0  # … but not between slices
+
+
+def test_nothing_visible_and_everything_visible():
+    volume = sparse_volume((6, 7, 9), np.uint8)
+    clear = RunStore(volume, Classification.of(TransferFunction([(0, (1, 1, 1), 0)]), volume))
+    full = RunStore(volume, EverythingVisible())
+    for axis in range(3):
+        assert clear.axis(axis).voxel_count == 0
+        decoded, stored = full.axis(axis).decode()
+        assert stored.all()
+        np.testing.assert_array_equal(decoded, standard_rows(volume, axis))
+    assert clear.visible_box() is None
+    np.testing.assert_array_equal(full.visible_box(), [[0, 0, 0], [8, 6, 5]])
+
+
+def test_nan_voxels_hide_nothing_else():
+    data = np.zeros((4, 4, 9), np.float32)
+    data[1, 1, 1], data[2, 2, 6] = np.nan, 50
+    volume = Volume(data)
+    store = RunStore(volume, Classification.of(bump(), volume))
+    _, stored = store.axis(2).decode()
+    assert stored[2, 2, 6]
+    assert not stored[0, 0, :4].any()
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_visible_box_holds_what_is_visible_and_little_more(axis):
+    data = np.zeros((20, 30, 40), np.uint8)
+    data[7:9, 11:15, 21:30] = 50
+    volume = Volume(data)
+    store = RunStore(volume, Classification.of(bump(), volume))
+    store.bounds.of(axis)  # the box may be found from any axis
+    low, high = store.visible_box()
+    tight_low, tight_high = np.array([20, 10, 6]), np.array([30, 15, 9])
+    assert (low <= tight_low).all() and (high >= tight_high).all()
+    slack = np.zeros(3)
+    slack[STANDARD_AXES[axis][0]] = 3
+    assert (low >= tight_low - slack).all() and (high <= tight_high + slack).all()
+
+
+def test_a_new_transfer_function_re_encodes_but_keeps_the_bounds():
+    volume = sparse_volume((5, 6, 7), np.uint8, share=0.2)
+    store = RunStore(volume, Classification.of(bump(), volume))
+    few = store.axis(0).voxel_count
+    low, _ = store.bounds.of(0)
+    store.classify(EverythingVisible())
+    assert store.axis(0).voxel_count == volume.data.size > few
+    assert store.bounds.of(0)[0] is low
+
+
+def test_axes_are_encoded_only_when_asked_for():
+    store = RunStore(sparse_volume((5, 6, 7), np.uint8), EverythingVisible())
+    assert store.bytes == 0
+    store.axis(1)
+    assert store.bounds.computed == (1,)
+    assert store.axis(1) is store.axis(1)
+    assert store.axis(1, pairs=True) is store.axis(1)  # what serves pairs serves slices
+
+
+@pytest.mark.parametrize("shape", [(1, 1, 1), (1, 5, 6), (5, 1, 6), (5, 6, 1)])
+def test_thin_volumes_encode_to_a_report(shape):
+    volume = Volume(np.full(shape, 50, np.uint8))
+    store = RunStore(volume, EverythingVisible())
+    assert store.visible_box() is None
+    for axis in range(3):
+        assert store.report(axis).dense_bytes == volume.data.nbytes
+
+
+def test_report_counts_runs_and_bytes():
+    data = np.zeros((8, 8, 64), np.uint8)
+    data[3, 3, 10:12] = 50
+    volume = Volume(data)
+    report = RunStore(volume, Classification.of(bump(), volume)).report(2)
+    # Blocks 2 (voxels 8 … 12) of the rows j = 2, 3, 4 in slice 3.
+    assert (report.axis, report.runs, report.voxels, report.mean_length) == ("z", 3, 15, 5.0)
+    assert report.voxels_bytes == 15
+    assert report.bytes == report.voxels_bytes + report.index_bytes
+    assert report.dense_bytes == 8 * 8 * 64

@@ -1,0 +1,64 @@
+"""Named tolerances, each with the line of reasoning that gives it."""
+
+# --- Reference ray caster and exact pictures ---------------------------------------------------------------
+
+# Rays are cut and lengths summed in float64: about 1e3 operations on numbers below 1e3, 1e-16 each.
+ROUNDING = 1e-10
+
+# A ramp's voxels are exact; what is left is the rule's error, for which the test asks 1e-10 summed per ray.
+REFERENCE_AT_1E_10 = 1e-9
+
+# The ball's bounds are rigorous for exact arithmetic, and allow for float32 voxels themselves.
+BALL_BOUND = ROUNDING
+
+# Trilinear interpolation lowers the ball's value by O(h²), which moves the surface by O(h²); the picture's
+# mean error follows. Four refinements fit the slope to about 0.2: the voxels' phase at the rim varies.
+BALL_ORDER = 1.8
+
+# A midpoint sum of N samples over a path of L and extinctions below τ errs by (steps crossed)·τ·L/N where the
+# transfer function steps: 10 · 0.7 · 10 / 4e5 = 2e-4; with kinks only, by (kinks)·slope·(L/N)² < 1e-7.
+MIDPOINT_STEPS = 2e-4
+MIDPOINT_KINKS = 1e-7
+
+# A marker is a tent of ±1 voxel, variance 1/6 voxel² along each axis. At distance D (voxels) perspective
+# moves its centroid by about 3·f·tan θ·(1/6)/D² pixels: f = 400, tan θ = 0.25, D = 45 gives 0.025; a pixel
+# lattice of 5 pixels a voxel integrates the tent's kinks to 0.01.
+MARKER_PIXELS = 0.05
+
+# --- Metrics -----------------------------------------------------------------------------------------------
+
+# Sums of a few thousand float64 numbers of order 1.
+METRIC = 1e-12
+
+# --- Compositing -------------------------------------------------------------------------------------------
+
+# Alpha errs by float32 rounding, 6e-8 a slice, and depths, counted from the volume's front, by 6e-8 of the
+# interval they are in: a dozen slices give 1e-6.
+CLOSED_FORM = 2e-6
+
+# Kernel in float32, twin in float64: a look-up may fall on the neighbouring table entry, which differs by
+# (0.5 opacity / 255 values) / 8 entries a value = 2.5e-4 of extinction for 8-bit data, one sample in a hundred.
+COMPOSITE_TWIN = 3e-4
+
+# Two float32 computations of the same image in another order: a few dozen roundings of 6e-8 …
+# and, rarely, the neighbouring table entry, as above.
+FLOAT32_IMAGE = 3e-4
+
+# --- Geometry and warp ------------------------------------------------------------------------------------
+
+# Products of a handful of float64 matrices with condition numbers up to 1e4, relative to their largest entry.
+MATRIX = 1e-10
+
+# float32 tangents below 4 in the face, interpolated in float32: a few roundings of 4 · 6e-8.
+WARP_LINEAR = 2e-6
+
+# Bilinear weights of float32 (positions of up to a few hundred pixels are float64) on values in 0 … 1.
+WARP_TWIN = 1e-6
+
+# --- Pictures ---------------------------------------------------------------------------------------------
+
+# Quality 1, pictures of 40³ … 48³ volumes from 56² pixels: a pixel a voxel, bilinear, so that structures of
+# two voxels lose some contrast. Smooth transfer functions: what users are promised. Opaque ones: an edge
+# moves by up to half a pixel over the silhouette, about 3 % of such small pictures; 26 dB.
+PICTURE_SMOOTH_DB = 38
+PICTURE_SURFACE_DB = 26

@@ -1,0 +1,112 @@
+"""Plain-numpy twins of the kernels: slow, obvious, and written from the formulas, not from the kernels."""
+
+import numpy as np
+
+BLOCK = 4
+WORD = 64
+
+
+def block_bounds(rows):
+    """(low, high) [n_j − 1, n_k, blocks] of voxels 4m … 4m + 4 of scanlines j and j + 1, NaN left out."""
+    n_j, n_k, n_i = rows.shape
+    blocks = -(-(n_i - 1) // BLOCK)
+    low, high = np.empty((2, n_j - 1, n_k, blocks))
+    for m in range(blocks):
+        part = rows[:, :, BLOCK * m : BLOCK * m + BLOCK + 1].astype(float)
+        smallest = np.where(np.isnan(part), np.inf, part).min(-1)
+        largest = np.where(np.isnan(part), -np.inf, part).max(-1)
+        low[..., m] = np.minimum(smallest[:-1], smallest[1:])
+        high[..., m] = np.maximum(largest[:-1], largest[1:])
+    return low, high
+
+
+def entries(values, origin, scale, last):
+    """Table row of each value: nearest entry, 1 … last."""
+    return np.clip(np.floor((values - origin) * scale + 1.5), 1, last).astype(int)
+
+
+def visible_blocks(low, high, table, origin, scale):
+    """Whether an entry from that of `low` to that of `high` has extinction, values a rounding wider."""
+    last = len(table) - 1
+    result = np.zeros(low.shape, bool)
+    for index in np.ndindex(low.shape):
+        if low[index] <= high[index]:
+            rounding = 0.01 / scale + 1e-6 * max(abs(low[index]), abs(high[index])) if scale else 0
+            first = entries(low[index] - rounding, origin, scale, last)
+            end = entries(high[index] + rounding, origin, scale, last)
+            result[index] = (table[first : end + 1, 3] > 0).any()
+    return result
+
+
+def stored_voxels(visible, shape, pairs):
+    """bool [j, k, i]: the voxels that a visible block touches."""
+    stored = np.zeros(shape, bool)
+    for j, k, m in zip(*np.nonzero(visible), strict=True):
+        stored[j : j + 2, k : k + (2 if pairs else 1), BLOCK * m : BLOCK * m + BLOCK + 1] = True
+    return stored
+
+
+def bits(words, blocks):
+    """bool [..., blocks] of packed words."""
+    m = np.arange(blocks)
+    return (words[..., m // WORD] >> (m % WORD).astype(np.uint64)) & np.uint64(1) != 0
+
+
+def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale, residual):
+    """One pixel of a face, float64: `face` = (eye i j k, sign, t_i, t_j, near). rows [j, k, i]."""
+    e, sign, t, near_world = np.array(face[:3]), face[3], np.array(face[4:6]), face[6]
+    direction = np.array([*t, sign])
+    length = np.sqrt(direction @ metric @ direction)
+    near, far = near_world / length, np.inf
+    for *a, a_0 in half_spaces:
+        at_eye, slope = np.dot(a, e) + a_0, np.dot(a, direction)
+        if slope > 0:
+            near = max(near, -at_eye / slope)
+        elif slope < 0:
+            far = min(far, -at_eye / slope)
+        elif at_eye < 0:
+            return np.zeros(4)
+    n_j, n_k, n_i = rows.shape
+    h = 1 / per_interval
+    k_planes = np.arange((n_k - 1) * per_interval + 1) * h
+    result = np.zeros(4)
+    for k in k_planes if sign > 0 else k_planes[::-1]:
+        distance = sign * (k - e[2])
+        weight = min(distance + h / 2, far) - max(distance - h / 2, near)
+        if weight <= 0:
+            continue
+        i, j = np.clip(e[:2] + t * distance, box[[0, 2]], box[[1, 3]])
+        i0, j0, k0 = min(int(i), n_i - 2), min(int(j), n_j - 2), min(int(k), n_k - 2)
+        cell = rows[j0 : j0 + 2, k0 : k0 + 2, i0 : i0 + 2].astype(float)
+        if k == k0:
+            cell = cell[:, 0]
+        elif k == k0 + 1:
+            cell = cell[:, 1]
+        else:
+            cell = cell[:, 0] + (k - k0) * (cell[:, 1] - cell[:, 0])
+        row = cell[0] + (j - j0) * (cell[1] - cell[0])
+        value = row[0] + (i - i0) * (row[1] - row[0])
+        if np.isnan(value):
+            continue
+        r, g, b, tau = table[entries(value, origin, scale, len(table) - 1)].astype(float)
+        share = (1 - result[3]) * -np.expm1(-tau * length * weight)
+        result += share * np.array([r, g, b, 1])
+        if residual and result[3] >= 1 - residual:
+            break
+    return result
+
+
+def warp_pixel(direction, faces):
+    """Bilinear look-up of an object-space direction; `faces`: list of (axes, sign, origin, pitch, image)."""
+    owner = max(faces, key=lambda f: f[1] * direction[f[0][2]]) if len(faces) > 1 else faces[0]
+    (i, j, k), sign, origin, pitch, image = owner
+    along = sign * direction[k]
+    if along <= 0 or (len(faces) > 1 and along < np.abs(direction).max()):
+        return np.zeros(4)
+    u, v = (np.array([direction[i], direction[j]]) / along - origin) / pitch - 0.5
+    height, width = image.shape[:2]
+    if not (0 <= u <= width - 1 and 0 <= v <= height - 1):
+        return np.zeros(4)
+    left, top = min(int(u), width - 2), min(int(v), height - 2)
+    weights = np.outer([1 - (v - top), v - top], [1 - (u - left), u - left])
+    return np.einsum("yx,yxc->c", weights, image[top : top + 2, left : left + 2].astype(float))
