@@ -44,9 +44,9 @@ def test_one_wrong_value_among_many():
 def test_covered_pixels_are_those_with_alpha_in_either():
     truth, image = np.zeros((2, 2, 4)), np.zeros((2, 2, 4))
     truth[0, 0] = 0.5  # missed by the image
-    image[0, 1] = 0.5  # not in the truth
-    assert abs(metrics.psnr_covered(image, truth) - 10 * np.log10(4)) < METRIC
-    assert abs(metrics.psnr(image, truth) - 10 * np.log10(8)) < METRIC
+    image[0, 1] = 0.25  # not in the truth
+    assert abs(metrics.psnr_covered(image, truth) + 10 * np.log10((0.25 + 0.0625) / 2)) < METRIC
+    assert abs(metrics.psnr(image, truth) + 10 * np.log10((0.25 + 0.0625) / 4)) < METRIC
     assert metrics.psnr_covered(np.zeros((2, 2, 4)), np.zeros((2, 2, 4))) == float("inf")
 
 
