@@ -70,7 +70,7 @@ def test_any_point_through_the_base_plane_lands_where_direct_projection_puts_it(
 
 
 def test_tangents_are_the_papers_base_plane_seen_from_the_eye(rng):
-    """Base plane point = eye + tangent · distance of the base plane: one is a scale and shift of the other."""
+    """Base plane point = eye + tangent · distance of the base plane: a scale and a shift apart."""
     for _ in range(50):
         volume, _, matrix, eye = random_view(rng)
         points = rng.uniform(0, np.array(volume.size) - 1, (40, 3))

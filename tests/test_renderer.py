@@ -24,10 +24,10 @@ def transfer_for(volume, points):
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.float32])
 def test_every_voxel_type_meets_the_reference(dtype):
-    volume = synthetic_ct(48, dtype=dtype)
+    volume = synthetic_ct(64, dtype=dtype)
     renderer = Renderer(volume, transfer_for(volume, SMOOTH))
     for towards in DIRECTIONS[:2]:
-        view = view_of(volume, towards, size=(64, 64))
+        view = view_of(volume, towards, size=(96, 96))
         result = compare(renderer.render(view), reference.render(volume, renderer.transfer, view))
         assert result["psnr"] > PICTURE_SMOOTH_DB
         assert abs(result["mean_signed_error"]) < 1e-3
@@ -43,36 +43,36 @@ def test_every_side_and_pose_meets_the_reference(points, floor, kind, rng):
         "sheared": random_pose(rng, shear=0.3),
         "flat": np.diag([1, 1, 4.0, 1]),
     }[kind]
-    volume = Volume(synthetic_ct(40).data, world_from_object=pose)
+    volume = Volume(synthetic_ct(64).data, world_from_object=pose)
     renderer = Renderer(volume, TransferFunction(points))
     for towards in DIRECTIONS:
-        view = view_of(volume, towards, size=(56, 56))
+        view = view_of(volume, towards, size=(96, 96))
         truth = reference.render(volume, renderer.transfer, view)
         assert psnr(renderer.render(view), truth) > floor, towards
 
 
 def test_near_views_need_several_faces_and_meet_the_reference():
-    volume = synthetic_ct(40)
+    volume = synthetic_ct(64)
     renderer = Renderer(volume, TransferFunction(SMOOTH))
-    view = view_of(volume, DIRECTIONS[1], 0.9, fovy=100, size=(80, 80))
+    view = view_of(volume, DIRECTIONS[1], 0.9, fovy=100, size=(120, 120))
     picture = renderer.render(view)
     assert renderer.last["faces"] == 3
     assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SMOOTH_DB
 
 
 def test_crop_and_clip_meet_the_reference():
-    volume = synthetic_ct(40)
-    regions = Regions(crop=(5, 33.5, 2.25, 39, 0, 30), clip=[(0.5, -0.3, 0.8, -15)])
-    renderer = Renderer(volume, TransferFunction(SMOOTH), regions=regions)
-    view = view_of(volume, DIRECTIONS[0], size=(64, 64))
+    volume = synthetic_ct(64)
+    regions = Regions(crop=(5, 58.5, 2.25, 59, 12, 63), clip=[(0.5, -0.3, 0.8, -15)])
+    renderer = Renderer(volume, TransferFunction(SMOOTH), Settings(residual=0), regions)
+    view = view_of(volume, DIRECTIONS[0], size=(96, 96))
     truth = reference.render(volume, renderer.transfer, view, regions=regions)
     assert psnr(renderer.render(view), truth) > PICTURE_SMOOTH_DB
-    whole = Renderer(volume, renderer.transfer)
+    whole = Renderer(volume, renderer.transfer, renderer.settings)
     whole.render(view)
     assert renderer.last["samples"] < whole.last["samples"]
 
 
-def test_error_falls_with_quality_down_to_a_thousandth():
+def test_error_falls_with_quality_and_samples():
     volume = synthetic_ct(32)
     view = view_of(volume, DIRECTIONS[0], size=(96, 96))
     renderer = Renderer(volume, TransferFunction(SMOOTH))
@@ -82,16 +82,27 @@ def test_error_falls_with_quality_down_to_a_thousandth():
         renderer.settings = Settings(quality=quality, samples_per_interval=samples, residual=0)
         errors.append(psnr(renderer.render(view), truth))
     assert errors == sorted(errors)
-    assert errors[-1] > 60
+    assert errors[-1] > 53  # rms 2e-3
+
+
+def test_opaque_functions_take_two_samples_an_interval_of_their_own_accord():
+    volume = synthetic_ct(48)
+    view = view_of(volume, DIRECTIONS[0], size=(64, 64))
+    for points, samples in ((SMOOTH, 1), ([*SURFACE[:2], (130, (0.9, 0.7, 0.5), 1.0)], 2)):
+        renderer = Renderer(volume, TransferFunction(points))
+        picture = renderer.render(view)
+        renderer.settings = Settings(samples_per_interval=samples)
+        np.testing.assert_array_equal(renderer.render(view), picture)
 
 
 @pytest.mark.parametrize("quality", [0.3, 1.0, 3.0])
 def test_quality_does_not_change_the_look(quality):
-    volume = synthetic_ct(32)
-    view = view_of(volume, DIRECTIONS[0], size=(48, 48))
-    renderer = Renderer(volume, TransferFunction(SMOOTH), Settings(quality=quality))
+    volume = synthetic_ct(64)
+    view = view_of(volume, DIRECTIONS[0], size=(96, 96))
+    settings = Settings(quality=quality, samples_per_interval=2)
+    renderer = Renderer(volume, TransferFunction(SMOOTH), settings)
     picture, truth = renderer.render(view), reference.render(volume, renderer.transfer, view)
-    np.testing.assert_allclose(picture.mean((0, 1)), truth.mean((0, 1)), rtol=0.01)
+    np.testing.assert_allclose(picture.mean((0, 1)), truth.mean((0, 1)), rtol=0.02)
 
 
 def test_parts_and_changes_give_the_same_picture_as_a_new_renderer():
@@ -105,7 +116,7 @@ def test_parts_and_changes_give_the_same_picture_as_a_new_renderer():
     fresh = Renderer(volume, TransferFunction(SURFACE), Settings(quality=2), renderer.regions)
     np.testing.assert_array_equal(renderer.render(view), fresh.render(view))
     renderer.settings = Settings(quality=2, skip_empty=False)
-    assert np.abs(renderer.render(view) - fresh.render(view)).max() < 0.1  # another rectangle, same picture
+    assert psnr(renderer.render(view), fresh.render(view)) > PICTURE_SURFACE_DB  # another rectangle
 
 
 def test_one_compositing_serves_several_walls_and_none_costs_nothing():
@@ -113,7 +124,7 @@ def test_one_compositing_serves_several_walls_and_none_costs_nothing():
     renderer = Renderer(volume, TransferFunction(SMOOTH))
     eye = volume.centre + np.array([0, 0, 60.0])
     front = View.look_at(eye, volume.centre, (0, 1, 0), 40, (64, 64))
-    away = View.look_at(eye, eye + (0, 0, 9), (0, 1, 0), 40, (64, 64))
+    away = View.look_at(eye, eye + np.array([0, 0, 9.0]), (0, 1, 0), 40, (64, 64))
     image = renderer.composite(front.eye, [front.wall, away.wall])
     np.testing.assert_array_equal(renderer.warp(image, front), renderer.render(front))
     assert not renderer.warp(image, away).any()
@@ -201,7 +212,9 @@ def test_picture_and_wall_orientation():
     data = np.zeros((9, 9, 9), np.uint8)
     data[4, 7, 7] = 255  # z, y, x
     volume = Volume(data)
-    picture = Renderer(volume, TransferFunction(SMOOTH)).render(view_of(volume, (0, 0, 1), 2.5, size=(64, 64)))
+    picture = Renderer(volume, TransferFunction(SMOOTH)).render(
+        view_of(volume, (0, 0, 1), 2.5, size=(64, 64))
+    )
     row, column = np.unravel_index(picture[..., 3].argmax(), (64, 64))
     assert row < 32 < column
     wall = Wall((-10, -10, 0), (10, -10, 0), (-10, 10, 0), (64, 64))

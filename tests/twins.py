@@ -67,12 +67,14 @@ def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, o
         elif at_eye < 0:
             return np.zeros(4)
     n_j, n_k, n_i = rows.shape
-    h = 1 / per_interval
-    k_planes = np.arange((n_k - 1) * per_interval + 1) * h
+    planes = np.arange((n_k - 1) * per_interval + 1)
     result = np.zeros(4)
-    for k in k_planes if sign > 0 else k_planes[::-1]:
+    for q in planes if sign > 0 else planes[::-1]:
+        k = q / per_interval
+        # Simpson's weights 1 4 1, 2 … of the interval, halved to both sides; alone, a slice stands for all.
+        half = 1 / 2 if per_interval == 1 else (1 if q % 2 == 0 else 2) / (3 * per_interval)
         distance = sign * (k - e[2])
-        weight = min(distance + h / 2, far) - max(distance - h / 2, near)
+        weight = min(distance + half, far) - max(distance - half, near)
         if weight <= 0:
             continue
         i, j = np.clip(e[:2] + t * distance, box[[0, 2]], box[[1, 3]])

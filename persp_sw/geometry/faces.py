@@ -222,7 +222,7 @@ def _wall_pitch(geometry: EyeGeometry, axis: int, sign: int) -> float:
 
 
 def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int) -> float:
-    """Smaller singular value of ∂t/∂pixel, at a low quantile over the pixels that show the box in this face."""
+    """Smaller singular value of ∂t/∂pixel: a low quantile over the pixels that show the box here."""
     width, height = view.size
     matrix = geometry.object_from_world @ view.direction_from_pixel
     column, row = np.meshgrid(

@@ -3,8 +3,10 @@
 All in standard space (i, j, k) of the face; see DESIGN section 3 in `docs/design.md`. Pixel (u, v) has the
 tangents t = t_0 + (u + ½, v + ½)·pitch; at distance D along k its ray is at i = e_i + t_i·D, j = e_j + t_j·D.
 Sample planes lie at D_q = sign·(k_q − e_k), k_q on slices and, for steep rays, between them. A plane stands
-for the part of [D_q − h/2, D_q + h/2] that lies in the ray's range [D_in, D_out], so α = 1 − exp(−τ·ℓ·length)
-with ℓ the world length of the ray in one slice interval: exact for a homogeneous medium.
+for the part of [D_q − h, D_q + h] that lies in the ray's range [D_in, D_out], so α = 1 − exp(−τ·ℓ·length)
+with ℓ the world length of the ray in one slice interval: exact for a homogeneous medium. With several planes
+an interval their lengths 2h are in Simpson's proportion 1 : 2, slices first; equal lengths would favour the
+slices, where values are extreme, over the means between them (real CT, opaque: 45.4 instead of 42.4 dB).
 
 Structure, after measurements: one scanline of the image at a time; its planes' runs are projected to tiles of
 16 pixels, so that a tile knows its planes front to back and empty space costs nothing; a tile stays in the
@@ -27,8 +29,9 @@ CHUNK = 32  # voxel rows are interpolated so many at a time, beyond their ends
 _DISTANCE, _ROW, _ROW_WEIGHT, _SLICE, _SLICE_WEIGHT, _INDEX = range(6)
 PLANE_COLUMNS = 6
 
-# Columns of `runs`, one row for each visible run of blocks of those planes: its plane, its first and last voxel
-# and where the first stands in the packed voxels for scanlines (j, k), (j + 1, k), (j, k + 1), (j + 1, k + 1).
+# Columns of `runs`, one row for each visible run of blocks of those planes: its plane, its first and last
+# voxel, and where the first stands in the packed voxels for scanlines (j, k), (j + 1, k), (j, k + 1) and
+# (j + 1, k + 1).
 _PLANE, _BEGIN, _END, _AT_00, _AT_10, _AT_01, _AT_11 = range(7)
 RUN_COLUMNS = 7
 
@@ -272,13 +275,8 @@ def _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges):
         ranges[np.uint64(n) + l] = np.inf
         ranges[np.uint64(2 * n) + l] = length
     for plane in range(half_spaces.shape[0]):
-        a_i, a_j, a_k, a_0 = (
-            half_spaces[plane, 0],
-            half_spaces[plane, 1],
-            half_spaces[plane, 2],
-            half_spaces[plane, 3],
-        )
-        at_eye = a_i * e_i + a_j * e_j + a_k * e_k + a_0
+        a_i, a_j, a_k = half_spaces[plane, 0], half_spaces[plane, 1], half_spaces[plane, 2]
+        at_eye = a_i * e_i + a_j * e_j + a_k * e_k + half_spaces[plane, 3]
         across = a_j * t_j + a_k * sign
         parallel = -np.inf if at_eye >= 0.0 else np.inf
         for l in range(np.uint64(n)):  # noqa: E741
@@ -314,20 +312,24 @@ def _start_tile(n, base, residual, ranges, lanes):
 
 @kernel
 def _composite_tile(
-    n, t_j, t_first, per_interval, face, metric, box, half_spaces, planes, tile, hits, count, runs, run_count,
-    voxels, table, origin, scale, residual, ranges, line, cells, lanes,
+    n, t_j, t_first, per_interval, most_per_interval, face, metric, box, half_spaces, planes, tile, hits,
+    count, runs, run_count, voxels, table, origin, scale, residual, ranges, line, cells, lanes,
 ):  # fmt: skip
     """One tile of n pixels through all its planes; returns the number of samples taken."""
     base = face[7]
     _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges)
     nearest, farthest = _start_tile(n, base, residual, ranges, lanes)
-    half = 0.5 / per_interval
+    stride = most_per_interval // per_interval
     last_cell = np.floor(box[1] - 1e-9)
     samples = 0
     for h in range(count):
         r = hits[tile, h]
         p = runs[r, _PLANE]
         distance = planes[p, _DISTANCE]
+        half = 0.5
+        if per_interval > 1:
+            on_even = (np.int64(planes[p, _INDEX]) // stride) % 2 == 0
+            half = (1.0 if on_even else 2.0) / (3.0 * per_interval)
         if distance - half >= farthest:
             break
         if distance + half <= nearest:
@@ -394,7 +396,7 @@ def _composite_row(
                     out[v, first + l, channel] = _F(0.0)
             continue
         samples += _composite_tile(
-            n, t_j, face[4] + (first + 0.5) * pitch, tile_steps[tile], face, metric, box, half_spaces, planes,
+            n, t_j, face[4] + (first + 0.5) * pitch, tile_steps[tile], per_interval, face, metric, box, half_spaces, planes,
             tile, hits, counts[tile], runs, run_count, voxels, table, origin, scale, residual, ranges, line,
             cells, lanes,
         )  # fmt: skip

@@ -73,9 +73,11 @@ class Classification:
 def _told_apart(transfer: TransferFunction, volume: Volume) -> tuple[float, float]:
     """The part of the volume's value range in which the function is not constant."""
     low, high = volume.value_range
-    inner_low, inner_high = transfer.values[0], transfer.values[-1]
-    low, high = max(low, inner_low), min(high, inner_high)
-    if high <= low:  # constant over all of the volume's values
-        middle = float(np.clip(low, *volume.value_range))
+    first, last = transfer.values[0], transfer.values[-1]
+    if len(transfer.values) > 1 and transfer.values[1] == first:
+        first -= ((last - first) or (high - low)) / 256  # a step at the first point: what is below it counts
+    first, last = max(low, first), min(high, last)
+    if last <= first:  # constant over all of the volume's values
+        middle = float(np.clip(first, low, high))
         return middle, middle
-    return float(low), float(high)
+    return float(first), float(last)

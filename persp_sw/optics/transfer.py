@@ -92,8 +92,9 @@ class TransferFunction:
 
     def _bracket(self, values: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Index of the last point at or below each value, and the weight of the next point, 0 … 1."""
-        values = np.clip(np.asarray(values, np.float64), self.values[0], self.values[-1])
+        values = np.asarray(values, np.float64)
         below = np.clip(np.searchsorted(self.values, values, side="right") - 1, 0, None)
+        values = np.clip(values, self.values[0], self.values[-1])
         above = np.minimum(below + 1, len(self.values) - 1)
         width = self.values[above] - self.values[below]
         return below, np.divide(
