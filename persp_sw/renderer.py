@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import perf_counter
 from typing import Any
 
@@ -36,6 +36,8 @@ class Renderer:
         Speed and accuracy.
     regions
         Which part is shown.
+    progress
+        Called as progress(done, total, what) while the volume is encoded.
 
     All of these but the volume may be changed at any time by assigning to the attribute of that name; what
     has to be encoded anew is, when next needed.
@@ -56,6 +58,7 @@ class Renderer:
         transfer: TransferFunction | None = None,
         settings: Settings | None = None,
         regions: Regions | None = None,
+        progress: Callable[[int, int, str], None] | None = None,
     ):
         self.volume = volume
         self.settings = settings or Settings()
@@ -63,7 +66,7 @@ class Renderer:
         self.last: dict[str, Any] = {}
         self._transfer = transfer or choose(volume).transfer
         self._classification = Classification.of(self._transfer, volume)
-        self.runs = RunStore(volume, self._visibility())
+        self.runs = RunStore(volume, self._visibility(), progress)
         self._skipping = self.settings.skip_empty
         if min(volume.size) == 1:
             _log.warning(

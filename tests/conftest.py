@@ -1,17 +1,16 @@
-"""What all tests share: a seeded generator, small volumes on disk, and the folder of real data."""
+"""Fixtures for all tests, and a line on what they run with."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from data_folder import DATA
+from samples import ball
 
 SEED = 2001
-ROOT = Path(__file__).resolve().parent.parent
-DATA = Path(os.environ.get("PERSP_SW_DATA") or ROOT.parent / "shared" / "data")
 
 
 def pytest_report_header() -> str:
@@ -28,28 +27,26 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture
-def real_volume() -> Callable[[str], Path]:
-    """Path of a real volume by its file name; skips the test, saying so, where it is absent."""
-
-    def find(name: str) -> Path:
-        path = DATA / "volumes" / name
-        if not path.is_file():
-            pytest.skip(f"real data absent: {path}; set PERSP_SW_DATA")
-        return path
-
-    return find
-
-
-def ball(count: int = 24, dtype: type = np.uint8, top: float = 200.0) -> np.ndarray:
-    """(count, count, count) voxels: `top` in the middle, falling linearly to 0 at the faces."""
-    grid = np.linspace(-1, 1, count)
-    radius = np.sqrt(grid[:, None, None] ** 2 + grid[None, :, None] ** 2 + grid[None, None, :] ** 2)
-    return (np.clip(1 - radius, 0, 1) * top).astype(dtype)
-
-
-@pytest.fixture
 def ball_file(tmp_path: Path) -> Path:
     """A ball of 24³ uint8 voxels as .npy."""
     path = tmp_path / "ball.npy"
     np.save(path, ball())
+    return path
+
+
+@pytest.fixture
+def scene_file(ball_file: Path) -> Path:
+    """A scene of that ball: small, moving, with a smooth transfer function."""
+    path = ball_file.with_name("scene.json")
+    keys = {
+        "volume": "ball.npy",
+        "tf": [[0, 0.2, 0.3, 0.8, 0], [200, 1, 0.6, 0.3, 0.4]],
+        "eye": [40, -50, 35],
+        "centre": [11.5, 11.5, 11.5],
+        "eye_step": [1, 0, 0],
+        "frames": 5,
+        "size": [48, 40],
+        "background": [0, 0, 1],
+    }
+    path.write_text(json.dumps(keys))
     return path

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from data_folder import volume_path
 from PIL import Image
+from samples import run
 
 import persp_sw as psw
-from persp_sw.cli import main
 from persp_sw.commands import demo
 from persp_sw.errors import FileError, MissingPackageError
 from persp_sw.volume.ssdf import read_ssdf
@@ -24,10 +24,6 @@ needs_visvis = pytest.mark.skipif(
     importlib.util.find_spec("visvis") is None, reason="visvis is not installed"
 )
 VIEWS = ["front", "side", "diagonal", "top", "close"]
-
-
-def run(*arguments: object):
-    return CliRunner().invoke(main, ["demo", *map(str, arguments)])
 
 
 # --- the file format ---------------------------------------------------------------------------------------
@@ -84,14 +80,14 @@ def test_files_that_are_no_ssdf(tmp_path: Path, content, words):
 
 
 @needs_visvis
-def test_the_stent_is_read_without_importing_visvis(real_volume):
+def test_the_stent_is_read_without_importing_visvis():
     volume = demo.stent()
     assert "visvis" not in sys.modules
     assert volume.size == (128, 128, 256)
     assert volume.data.dtype == np.int16
     assert volume.value_range == (0, 2000)
     # The same scan with its values in whole numbers: half a level of rounding apart.
-    same = psw.load(real_volume("stent.nrrd")).data.astype(int)
+    same = psw.load(volume_path("stent.nrrd")).data.astype(int)
     assert np.abs(volume.data - same).max() <= 1
 
 
@@ -99,7 +95,7 @@ def test_without_visvis_the_extra_is_named(monkeypatch, tmp_path: Path):
     monkeypatch.setattr(demo.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(MissingPackageError):
         demo.stent()
-    result = run("-o", tmp_path / "out")
+    result = run("demo", "-o", tmp_path / "out")
     assert result.exit_code == 2
     assert "pip install 'persp-sw[demo]'" in result.stderr
     assert "--volume FILE" in result.stderr
@@ -110,7 +106,7 @@ def test_without_visvis_the_extra_is_named(monkeypatch, tmp_path: Path):
 
 @needs_visvis
 def test_the_demo_writes_and_measures(tmp_path: Path):
-    result = run("-o", tmp_path / "new" / "out", "--size", 64, "--json")
+    result = run("demo", "-o", tmp_path / "new" / "out", "--size", 64, "--json")
     assert result.exit_code == 0, result.output
     values = json.loads(result.stdout)
     assert [row["view"] for row in values["views"]] == VIEWS
@@ -126,7 +122,7 @@ def test_the_demo_writes_and_measures(tmp_path: Path):
 
 
 def test_the_demo_shows_another_volume(ball_file: Path, tmp_path: Path):
-    result = run("-o", tmp_path / "out", "--size", 24, "--volume", ball_file)
+    result = run("demo", "-o", tmp_path / "out", "--size", 24, "--volume", ball_file)
     assert result.exit_code == 0, result.output
     for words in ("ball, 24 × 24 × 24 voxels", "PSNR", "diagonal", f"are in {tmp_path / 'out'}/"):
         assert words in result.stdout
@@ -135,6 +131,6 @@ def test_the_demo_shows_another_volume(ball_file: Path, tmp_path: Path):
 
 def test_a_folder_that_cannot_be(tmp_path: Path):
     (tmp_path / "file").touch()
-    result = run("-o", tmp_path / "file")
+    result = run("demo", "-o", tmp_path / "file")
     assert result.exit_code == 2
     assert "cannot make the folder" in result.stderr

@@ -35,7 +35,9 @@ def test_an_eye_image_without_faces_travels_too(image):
     assert other.faces == () and other.pixels.shape == (0, 4)
 
 
-@pytest.mark.parametrize("damage", [lambda b: b"", lambda b: b"hello", lambda b: b[:-40], lambda b: b[: len(b) // 2]])
+@pytest.mark.parametrize(
+    "damage", [lambda b: b"", lambda b: b"hello", lambda b: b[:-40], lambda b: b[: len(b) // 2]]
+)
 def test_damaged_bytes_are_refused_by_name(image, damage):
     with pytest.raises(ViewError, match="eye image"):
         EyeImage.from_bytes(damage(image.to_bytes()))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import ball
+from data_folder import volume_path
+from samples import ball
 
 import persp_sw as psw
 from persp_sw.errors import TransferFunctionError
@@ -81,8 +82,8 @@ def test_the_kind_of_data_is_recognised(rng, make, name):
         ("neghip.nrrd", "simulation"),
     ],
 )
-def test_real_data_get_the_preset_they_were_looked_at_with(real_volume, file, name):
-    assert presets.choose(psw.load(real_volume(file))).name == name
+def test_real_data_get_the_preset_they_were_looked_at_with(file, name):
+    assert presets.choose(psw.load(volume_path(file))).name == name
 
 
 AWKWARD = {

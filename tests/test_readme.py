@@ -12,8 +12,8 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
-from conftest import ROOT
 from PIL import Image
+from samples import ROOT
 
 from persp_sw.cli import main
 from persp_sw.scene import Scene

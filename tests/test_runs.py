@@ -153,3 +153,13 @@ def test_report_counts_runs_and_bytes():
     assert report.voxels_bytes == 15
     assert report.bytes == report.voxels_bytes + report.index_bytes
     assert report.dense_bytes == 8 * 8 * 64
+
+
+def test_encoding_reports_its_steps():
+    steps = []
+    volume = sparse_volume((5, 6, 7), np.uint8)
+    store = RunStore(volume, EverythingVisible(), lambda *step: steps.append(step))
+    store.axis(1)
+    assert steps == [(n, 3, "encoding y") for n in range(4)]
+    store.axis(1)
+    assert len(steps) == 4

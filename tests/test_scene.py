@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import ball
+from samples import ball
 
 import persp_sw as psw
 from persp_sw.errors import FileError, SceneError, VolumeError
@@ -74,6 +74,13 @@ def test_a_given_eye_gets_an_angle_that_shows_all(ball_file: Path):
     scene = psw.Scene.of_file(ball_file, eye=[90, 80, 11], size=[300, 200])
     pixels = scene.view().project(np.array(list(product((0, 23), repeat=3)), float))
     assert ((pixels > 0) & (pixels < (300, 200))).all()
+
+
+@pytest.mark.parametrize("size", [(400, 100), (100, 400)])
+def test_wide_and_tall_pictures_show_all_too(ball_file: Path, size):
+    scene = psw.Scene.of_file(ball_file, size=size)
+    pixels = scene.view().project(np.array(list(product((0, 23), repeat=3)), float))
+    assert ((pixels > 0) & (pixels < size)).all()
 
 
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1)])
@@ -152,6 +159,7 @@ def test_a_scene_of_a_volume_in_memory():
     scene = psw.Scene.of_volume(volume, tf=np.array(ROWS), eye=np.array([90.0, 0, 0]))
     assert scene.volume is volume
     assert scene.transfer.values.tolist() == [0, 100, 200]
+    assert psw.Scene.of_volume(volume, spacing=(1, 2, 3)).volume.spacing == (1, 2, 3)
     with pytest.raises(SceneError, match="only in memory"):
         scene.save("nowhere.json")
 
@@ -168,7 +176,7 @@ def test_saved_and_loaded_again_from_elsewhere(ball_file: Path, name: str):
 
 
 @pytest.mark.parametrize(
-    ("step", "samples"), [(None, 1), (2, 1), (1, 1), (0.5, 2), (0.3, 2), (0.25, 4), (0.1, 4)]
+    ("step", "samples"), [(None, None), (2, None), (1, None), (0.5, 2), (0.3, 2), (0.25, 4), (0.1, 4)]
 )
 def test_step_is_a_hint_for_samples(ball_file: Path, step, samples):
     keys = {} if step is None else {"step": step}

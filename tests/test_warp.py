@@ -37,7 +37,9 @@ def test_every_pixel_looks_up_its_own_ray(mirrored, distance, rng):
     inverse = np.linalg.inv(volume.world_from_object[:3, :3])
     for towards in DIRECTIONS:
         view = view_of(volume, towards, distance, fovy=75)
-        image = with_pixels(eye_image_of(volume, view), lambda f, a, b: (a, b, f.axis + 0 * a, f.sign + 0 * a))
+        image = with_pixels(
+            eye_image_of(volume, view), lambda f, a, b: (a, b, f.axis + 0 * a, f.sign + 0 * a)
+        )
         picture = warp_eye_image(image, view)
         shown = picture[..., 3] != 0
         assert shown.sum() > 100

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
@@ -116,10 +116,18 @@ class RunStore:
     visibility
         What can be seen; `classify` changes it, and axes are encoded anew when next needed. The blocks'
         bounds do not depend on it and are kept.
+    progress
+        Called as progress(steps done, steps, "encoding x") while an axis is encoded.
     """
 
-    def __init__(self, volume: Volume, visibility: Visibility):
+    def __init__(
+        self,
+        volume: Volume,
+        visibility: Visibility,
+        progress: Callable[[int, int, str], None] | None = None,
+    ):
         self.volume = volume
+        self.progress = progress
         self.bounds = BlockBounds(volume)
         self._axes: dict[int, AxisRuns] = {}
         self._box: tuple[NDArray, NDArray] | None = None
@@ -183,6 +191,10 @@ class RunStore:
         """Memory of the axes encoded so far: voxels and index, without the blocks' bounds."""
         return sum(runs.voxel_count * runs.voxels.itemsize + runs.index_bytes for runs in self._axes.values())
 
+    def _report(self, step: int, axis: int) -> None:
+        if self.progress:
+            self.progress(step, 3, f"encoding {'xyz'[axis]}")
+
     @contextmanager
     def _timed(self) -> Iterator[None]:
         """Add the time spent in the block, less compilation, to `encode_seconds`."""
@@ -201,15 +213,19 @@ class RunStore:
     def _encode(self, axis: int, pairs: bool) -> AxisRuns:
         rows = standard_rows(self.volume, axis)
         n_j, n_k, n_i = rows.shape
+        self._report(0, axis)
         visible = self._mark(axis, pairs=False)
         between = self._mark(axis, pairs=True) if pairs else np.empty((0, 0, visible.shape[2]), np.uint64)
         needed = np.empty((n_j, n_k, visible.shape[2]), np.uint64)
+        self._report(1, axis)
         encode.mark_needed(between if pairs else visible, pairs, needed)
         counts = np.empty(needed.shape, np.int64)
         runs = np.empty(needed.shape, np.int64)
         encode.count_voxels(needed, n_i, counts, runs)
+        self._report(2, axis)
         ends = np.cumsum(counts.reshape(-1))
         offsets = (ends - counts.reshape(-1)).reshape(counts.shape)
         voxels = np.zeros(int(counts.sum()) + _PADDING, rows.dtype)
         encode.pack(rows, needed, offsets, voxels)
+        self._report(3, axis)
         return AxisRuns((n_i, n_j, n_k), visible, between, needed, offsets, voxels, int(runs.sum()))

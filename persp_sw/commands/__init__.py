@@ -1,0 +1,1 @@
+"""The commands of `persp-sw`, one module each."""

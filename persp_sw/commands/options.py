@@ -1,0 +1,114 @@
+"""Options that several commands share, and the scene they make."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+from ..optics.presets import NAMES
+from ..scene import Scene
+from ..volume.grid import Volume
+from .output import ProgressCall
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_VOLUME_OPTIONS = [
+    click.option(
+        "--spacing", type=float, nargs=3, metavar="X Y Z", help="Voxel spacing; the file's pose is dropped."
+    ),
+    click.option("--frame", "time_frame", type=int, metavar="N", help="Frame of a 4D file, from 0."),
+    click.option("--component", metavar="N|magnitude", help="Component of a multi-component file, from 0."),
+    click.option("--series", metavar="N|UID", help="Series of a DICOM folder, from 1."),
+    click.option("--shape", type=int, nargs=3, metavar="X Y Z", help="Raw files: voxels along x, y and z."),
+    click.option("--dtype", metavar="TYPE", help="Raw files: uint8, int16, uint16, float32, …"),
+    click.option("--byte-order", type=click.Choice(["little", "big"]), help="Raw files; little by default."),
+    click.option("--header-bytes", type=int, metavar="N", help="Raw files: bytes to leave out at the start."),
+]
+tf_option = click.option(
+    "--preset",
+    "--tf",
+    "tf",
+    metavar="NAME|FILE",
+    help="Transfer function: a preset or a saved one; chosen from the values by default.",
+)
+_VIEW_OPTIONS = [
+    tf_option,
+    click.option("--size", type=int, nargs=2, metavar="W H", help="Picture size in pixels."),
+    click.option("--eye", type=float, nargs=3, metavar="X Y Z", help="Where the eye stands, world."),
+    click.option("--centre", type=float, nargs=3, metavar="X Y Z", help="The point in the middle, world."),
+    click.option("--up", type=float, nargs=3, metavar="X Y Z", help="What points upwards."),
+    click.option("--fovy", type=float, metavar="DEGREES", help="Vertical opening angle."),
+    click.option("--background", type=float, nargs=3, metavar="R G B", help="Linear colour behind, 0 … 1."),
+    click.option("--frames", type=int, metavar="N", help="Frames to time."),
+]
+_SETTING_OPTIONS = [
+    click.option(
+        "--quality", type=float, default=1.0, show_default=True, help="Sharpness of the eye image, 0.05 … 8."
+    ),
+    click.option(
+        "--samples",
+        type=click.Choice(["1", "2", "4"]),
+        help="Samples from slice to slice; by default 2 where one can be opaque, else 1.",
+    ),
+    click.option(
+        "--residual", type=float, default=0.005, show_default=True, help="Rays stop at this transparency."
+    ),
+    click.option("--threads", type=int, metavar="N", help="Threads; all cores by default."),
+]
+
+
+def volume_options(function: Function) -> Function:
+    """Which volume of a file, and how to read a raw one."""
+    return _decorated(function, _VOLUME_OPTIONS)
+
+
+def view_options(function: Function) -> Function:
+    """How it looks and from where; over the scene file's keys."""
+    return _decorated(function, _VIEW_OPTIONS)
+
+
+def setting_options(function: Function) -> Function:
+    """Speed and accuracy."""
+    return _decorated(function, _SETTING_OPTIONS)
+
+
+def json_option(function: Function) -> Function:
+    """--json."""
+    return click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout, nothing else.")(
+        function
+    )
+
+
+def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
+    """The scene of a scene file (.json, .toml) or of a volume file; what is `given` replaces its keys."""
+    keys = {name: value for name, value in given.items() if value is not None}
+    for name in ("component", "series"):
+        if str(keys.get(name, "")).isdecimal():
+            keys[name] = int(keys[name])
+    if "tf" in keys and keys["tf"] not in NAMES:  # relative to here, not to the scene
+        keys["tf"] = str(Path(keys["tf"]).absolute()) if Path(keys["tf"]).exists() else keys["tf"]
+    if Path(path).suffix.lower() in (".json", ".toml"):
+        return Scene.load(path, progress=progress, **keys)
+    return Scene.of_file(path, progress=progress, **keys)
+
+
+def say_missing_voxels(volume: Volume) -> None:
+    """A warning on stderr where a volume has voxels without a value."""
+    if volume.nonfinite:
+        share = 100 * volume.nonfinite / volume.data.size
+        logging.getLogger("persp_sw").warning(
+            "%d of %d voxels (%.3g %%) are NaN or infinite; they are left transparent",
+            volume.nonfinite,
+            volume.data.size,
+            share,
+        )
+
+
+def _decorated(function: Function, options: list[Callable[[Function], Function]]) -> Function:
+    for option in reversed(options):
+        function = option(function)
+    return function
