@@ -146,11 +146,12 @@ def test_close_by_the_image_does_not_shrink_to_nothing():
     assert min(sizes) >= 20
 
 
-def test_size_never_exceeds_the_limit():
+@pytest.mark.parametrize("limit", [16, 250, 256])
+def test_size_never_exceeds_the_limit(limit):
     volume = empty_volume((200, 200, 200))
     view = view_of(volume, DIRECTIONS[0], 1.7, size=(800, 800))
-    (face,) = plan(geometry_of(volume, view), quality=8, max_size=256)
-    assert max(face.size) <= 256
+    (face,) = plan(geometry_of(volume, view), quality=8, max_size=limit)
+    assert max(face.size) <= limit
     assert covers(face, rays_that_meet(geometry_of(volume, view), view)).all()
 
 

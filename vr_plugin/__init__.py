@@ -1,0 +1,1 @@
+"""Walls, tracking and stereo windows; nothing here yet."""

@@ -200,11 +200,10 @@ def _face(
     high = np.clip([t_i.max(), t_j.max()], -limit, limit)
     pitch = max(_volume_pitch(distance), _wall_pitch(geometry, axis, sign)) / quality
     margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
-    pitch = max(pitch, (high - low).max() / (max_size - margin - 1))
+    limit = max_size // _WIDTH_STEP * _WIDTH_STEP
+    pitch = max(pitch, (high - low).max() / (limit - margin - 1))
     width, height = (int(n) + margin for n in np.ceil((high - low) / pitch))
     width = -(-width // _WIDTH_STEP) * _WIDTH_STEP
-    if width > max_size:
-        width = max_size // _WIDTH_STEP * _WIDTH_STEP
     # Centred, so that a mirrored volume has the mirrored image.
     origin = (low + high) / 2 - np.array([width, height]) / 2 * pitch
     return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width, height))
