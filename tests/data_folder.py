@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 _DEFAULT = Path(__file__).resolve().parents[2] / "shared" / "data"
+DATA = Path(os.environ.get("PERSP_SW_DATA") or _DEFAULT)
 
 
 def volume_path(name: str) -> Path:
@@ -15,7 +16,7 @@ def volume_path(name: str) -> Path:
 
     The folder is named by the environment variable PERSP_SW_DATA, else `../shared/data` beside the project.
     """
-    path = Path(os.environ.get("PERSP_SW_DATA", _DEFAULT)) / "volumes" / name
+    path = DATA / "volumes" / name
     if not path.is_file():
         pytest.skip(f"{path} is absent; set PERSP_SW_DATA to the data folder")
     return path

@@ -4,9 +4,7 @@ import zlib
 
 import numpy as np
 import pytest
-from test_files import refused
-from test_nrrd import itk
-from volume_files import marked, metaimage, where_marked
+from volume_files import itk, marked, metaimage, refused, where_marked
 
 from persp_sw.errors import FileError
 from persp_sw.volume.files import load

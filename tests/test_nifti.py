@@ -5,9 +5,7 @@ import struct
 
 import numpy as np
 import pytest
-from test_files import refused
-from test_nrrd import itk
-from volume_files import MARKED, SIZE, marked, nifti2_header, nifti_header, where_marked
+from volume_files import MARKED, SIZE, itk, marked, nifti2_header, nifti_header, refused, where_marked
 
 from persp_sw.volume.files import load
 
@@ -115,7 +113,7 @@ def test_pairs(tmp_path, magic, packed):
     (tmp_path / f"v.img{tail}").write_bytes(pack(marked().tobytes()[:-8]))
     refused_image(tmp_path / f"v.hdr{tail}")
     (tmp_path / f"v.img{tail}").unlink()
-    refused(tmp_path / f"v.hdr{tail}", "v.img is missing")
+    refused(tmp_path / f"v.hdr{tail}", f"v.img{tail} is missing")
 
 
 def refused_image(path):
@@ -162,6 +160,9 @@ def test_frames_and_components(tmp_path):
     path = write(tmp_path / "c.nii", nifti_header(datatype=128), rgb)
     refused(path, "3 components")
     assert np.array_equal(load(path, component=2).data, rgb[..., 2])
+    path = write(tmp_path / "d.nii", nifti_header(datatype=128, scale=(2, 1)), rgb)
+    length = np.linalg.norm(2.0 * rgb + 1, axis=-1)  # of the rescaled components
+    assert np.allclose(load(path, component="magnitude").data, length, rtol=1e-6)
 
 
 @pytest.mark.parametrize("ending", ["nii", "nii.gz"])
@@ -195,18 +196,30 @@ def test_bad_spacing(tmp_path, spacing):
 
 
 def test_bad_headers(tmp_path):
+    for name in ("far.nii", "far.nii.gz"):
+        refused(write(tmp_path / name, nifti_header(voxels=1e18)), "again")
     path = write(tmp_path / "v.nii", nifti_header(datatype=1536))
     refused(path, "data type 1536")
     header = nifti_header()
     struct.pack_into("<h", header, 42, -7)
     refused(write(path, header), "sizes [-7, 6, 5]")
     struct.pack_into("<h", header, 40, 0)
-    refused(write(path, header), "sizes []")
+    refused(write(path, header), "sizes [0]")
     header = nifti_header()
     struct.pack_into("<f", header, 108, np.nan)
     refused(write(path, header), "byte nan")
     path.write_bytes(bytes(nifti_header())[:300])
     refused(path, "too short")
+    refused(write(path, nifti_header(magic=b"\0\0\0\0")), "is not a NIfTI")  # ANALYZE comes in pairs
+    refused(write(path, nifti_header(quatern=(1, 1, 1))), "header is damaged")
+    refused(write(path, nifti_header(scale=(2, np.inf))), "intercept")
+
+
+def test_header_is_taken_as_it_is(tmp_path, capfd):
+    """nibabel would put a spacing of its own for a bad one, and say so on the terminal."""
+    header = nifti_header(pixdim=(0, 2, 3, 4), quatern=(0, 0, 0))  # a qfac of 0 counts as 1
+    assert where_marked(load(write(tmp_path / "v.nii", header))) == pytest.approx((-10, -3, 12))
+    assert capfd.readouterr() == ("", "")
 
 
 def test_marker(tmp_path):

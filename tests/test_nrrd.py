@@ -5,23 +5,10 @@ import gzip
 
 import numpy as np
 import pytest
-from test_files import refused
-from volume_files import MARKED, SIZE, marked, nrrd, where_marked
+from volume_files import MARKED, SIZE, itk, marked, nrrd, refused, where_marked
 
 from persp_sw.errors import FileError
 from persp_sw.volume.files import load
-
-
-def itk(path):
-    """Array and (4, 4) pose as ITK reads the file."""
-    import SimpleITK as sitk
-
-    image = sitk.ReadImage(str(path))
-    n = image.GetDimension()
-    matrix = np.eye(4)
-    matrix[:3, :3] = (np.reshape(image.GetDirection(), (n, n)) * image.GetSpacing())[:3, :3]
-    matrix[:3, 3] = image.GetOrigin()[:3]
-    return sitk.GetArrayFromImage(image), matrix
 
 
 # The marker is voxel (5, 1, 3); steps of 2, 3, 4 from (1, 2, 3) put it at (1 + 10, 2 + 3, 3 + 12)
@@ -208,9 +195,22 @@ def test_truncated_gzip(tmp_path, cut):
 
 
 def test_flipped_bit_in_gzip(tmp_path):
-    packed = bytearray(gzip.compress(marked().tobytes(), compresslevel=0))
-    packed[100] ^= 1  # stored, not deflated: only the checksum can tell
-    refused(nrrd(tmp_path / "v.nrrd", marked(), end=bytes(packed), encoding="gzip"), "damaged")
+    for after in (b"", b"more than the voxels"):
+        packed = bytearray(gzip.compress(marked().tobytes() + after, compresslevel=0))
+        path = nrrd(tmp_path / "v.nrrd", marked(), end=bytes(packed), encoding="gzip")
+        assert np.array_equal(load(path).data, marked())
+        packed[100] ^= 1  # stored, not deflated: only the checksum can tell
+        refused(nrrd(path, marked(), end=bytes(packed), encoding="gzip"), "damaged")
+
+
+def test_spaces_in_vectors_and_names(tmp_path):
+    """What pynrrd alone would not take, and Teem writes or reads."""
+    fields = (
+        *("Space: LPS", "spacedirections: ( 2, 0, 0 ) (0, 3, 0) (0,0,4)", "space origin: (1, 2, 3)"),
+        *('space units: "mm" "mm" "m', "key:=value: and more", "kinds:space space space"),
+    )
+    volume = load(nrrd(tmp_path / "v.nrrd", marked(), *fields))
+    assert where_marked(volume) == pytest.approx((11, 5, 15)) and volume.orientation == "LPS"
 
 
 def test_one_file_per_slice(tmp_path):

@@ -1,11 +1,17 @@
-"""Small volume files written byte by byte, so that the tests know their contents without any library."""
+"""Small volume files written byte by byte, so that the tests know their contents without any library,
+and checks of what comes of them."""
 
 from __future__ import annotations
 
+import os
 import struct
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from persp_sw.errors import FileError
+from persp_sw.volume.files import load
 
 SIZE = (7, 6, 5)  # x, y, z
 MARK = (5, 1, 3)  # voxel of the marker, off every centre
@@ -24,6 +30,30 @@ def where_marked(volume) -> np.ndarray:
     """World position of the marker: where the data say it is, through the pose."""
     z, y, x = np.argwhere(volume.data == MARKED)[0]
     return (volume.world_from_object @ (x, y, z, 1))[:3]
+
+
+def refused(path, *words: str, error=FileError, **options) -> str:
+    """The message with which `load` refuses; it names the path and gives advice after a semicolon."""
+    with pytest.raises(error) as caught:
+        load(path, **options)
+    message = str(caught.value)
+    assert caught.value.__suppress_context__ or caught.value.__context__ is None  # no traceback of a library
+    for word in (*words, os.path.basename(str(path))):
+        assert word in message, f"{word!r} is not in {message!r}"
+    assert error is not FileError or ";" in message
+    return message
+
+
+def itk(path):
+    """Array and (4, 4) pose as ITK reads the file."""
+    import SimpleITK as sitk
+
+    image = sitk.ReadImage(str(path))
+    n = image.GetDimension()
+    matrix = np.eye(4)
+    matrix[:3, :3] = (np.reshape(image.GetDirection(), (n, n)) * image.GetSpacing())[:3, :3]
+    matrix[:3, 3] = image.GetOrigin()[:3]
+    return sitk.GetArrayFromImage(image), matrix
 
 
 def nrrd(
