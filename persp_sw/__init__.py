@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import images, reference
-    from .compositor import EyeImage
     from .errors import PerspSWError
+    from .eye_image import EyeImage
     from .geometry.regions import Regions
     from .geometry.view import Eye, View, Wall
     from .optics.transfer import TransferFunction
@@ -43,7 +43,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Eye": ".geometry.view",
-    "EyeImage": ".compositor",
+    "EyeImage": ".eye_image",
     "PerspSWError": ".errors",
     "Regions": ".geometry.regions",
     "Renderer": ".renderer",

@@ -19,6 +19,18 @@ Vector: TypeAlias = Sequence[float] | NDArray[np.floating]  # 3 numbers, xyz
 VOXEL_DTYPES = tuple(np.dtype(t) for t in (np.uint8, np.int16, np.uint16, np.float32))
 
 
+def number(
+    value: float, name: str, error: type[PerspSWError], low: float = -np.inf, high: float = np.inf
+) -> float:
+    """`value` as a finite float in [low, high], or `error` naming it; no text, truth value or array."""
+    good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    if not (good and np.isfinite(value) and low <= value <= high):
+        least = "" if np.isinf(low) else f" ≥ {low:g}"
+        wanted = f"must be a number{least}" if np.isinf(high) else f"lies between {low:g} and {high:g}"
+        raise error(f"{name} {wanted}; given {value!r}")
+    return float(value)
+
+
 def vector(value: Vector, name: str, error: type[PerspSWError], length: int = 3) -> NDArray[np.float64]:
     """`value` as a finite float64 array of `length` numbers, or `error` naming it."""
     try:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from dataclasses import dataclass
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _jit
-from .arrays import Image, Matrix
-from .errors import EyeInsideVolumeError, ViewError
+from .arrays import Image
+from .errors import EyeInsideVolumeError
+from .eye_image import EyeImage
 from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
@@ -24,88 +22,6 @@ from .volume.runs import RunStore
 
 # Optical depth of one interval beyond which a single sample hides all that follows (5 % are left).
 _OPAQUE = 3.0
-
-
-@dataclass(frozen=True, eq=False)
-class EyeImage:
-    """What one eye sees of the volume, whatever the walls: one image for each principal direction in use.
-
-    Attributes
-    ----------
-    eye
-        The eye it was composited for.
-    world_from_object
-        The volume's pose, (4, 4).
-    faces
-        Geometry of each face; `face_pixels(n)` are the pixels of face n.
-    pixels
-        (total, 4) float32 linear premultiplied RGBA: the faces' pixels one after the other, row by row.
-    samples
-        Voxel samples taken to make it.
-    """
-
-    eye: Eye
-    world_from_object: Matrix
-    faces: tuple[Face, ...]
-    pixels: NDArray[np.float32]
-    samples: int
-
-    def offset(self, number: int) -> int:
-        """Where face `number` begins in `pixels`."""
-        return sum(face.size[0] * face.size[1] for face in self.faces[:number])
-
-    def face_pixels(self, number: int) -> Image:
-        """(height, width, 4) view of face `number`; row v grows with t_j, column u with t_i."""
-        width, height = self.faces[number].size
-        start = self.offset(number)
-        return self.pixels[start : start + width * height].reshape(height, width, 4)
-
-    def world_from_tangents(self, number: int) -> Matrix:
-        """(3, 3): world direction of the ray (t_i, t_j, 1) of face `number`; the ray starts at the eye.
-
-        A quad with its corners at eye + world_from_tangents · (t_i, t_j, 1)·D shows the face, for any D > 0.
-        """
-        face = self.faces[number]
-        matrix = self.world_from_object[:3, list(STANDARD_AXES[face.axis])].copy()
-        matrix[:, 2] *= face.sign
-        return matrix
-
-    def to_bytes(self) -> bytes:
-        """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""
-        table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size) for f in self.faces]
-        buffer = io.BytesIO()
-        np.savez(
-            buffer,
-            eye=np.array([*self.eye.position, self.eye.near]),
-            world_from_object=self.world_from_object,
-            faces=np.array(table, np.float64).reshape(-1, 7),
-            pixels=self.pixels,
-            samples=np.int64(self.samples),
-        )
-        return buffer.getvalue()
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> EyeImage:
-        """Inverse of `to_bytes`; ViewError if the bytes are something else."""
-        try:
-            with np.load(io.BytesIO(data), allow_pickle=False) as file:
-                faces = tuple(
-                    Face(int(a), int(s), (t_i, t_j), pitch, (int(w), int(h)))
-                    for a, s, t_i, t_j, pitch, w, h in file["faces"].tolist()
-                )
-                *position, near = file["eye"].tolist()
-                image = cls(
-                    Eye(position, near),
-                    file["world_from_object"],
-                    faces,
-                    file["pixels"],
-                    int(file["samples"]),
-                )
-        except (OSError, EOFError, ValueError, KeyError, BadZipFile) as error:
-            raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
-        if image.offset(len(faces)) != len(image.pixels):
-            raise ViewError("this eye image's faces do not fit its pixels; it was damaged on the way")
-        return image
 
 
 def composite_eye(
@@ -145,18 +61,15 @@ def composite_eye(
             single_face_tangent=settings.single_face_tangent,
             max_size=settings.max_intermediate,
         )
-    image = EyeImage(
-        eye, pose, tuple(faces), np.empty((sum(f.size[0] * f.size[1] for f in faces), 4), np.float32), 0
-    )
+    pixels = np.empty((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
-    samples = 0
-    for number, face in enumerate(faces):
-        pixels = image.face_pixels(number)
-        samples += _composite(
-            store, classification, regions, settings, eye, eye_object, face, threads, pixels
-        )
-    object.__setattr__(image, "samples", samples)
-    return image
+    samples, start = 0, 0
+    for face in faces:
+        width, height = face.size
+        out = pixels[start : start + width * height].reshape(height, width, 4)
+        start += width * height
+        samples += _composite(store, classification, regions, settings, eye, eye_object, face, threads, out)
+    return EyeImage(eye, pose, tuple(faces), pixels, samples)
 
 
 def _seen_box(store: RunStore, regions: Regions) -> tuple[NDArray, NDArray] | None:

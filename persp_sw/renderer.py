@@ -9,7 +9,8 @@ from typing import Any
 
 from . import _jit
 from .arrays import Image
-from .compositor import EyeImage, composite_eye
+from .compositor import composite_eye
+from .eye_image import EyeImage
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
 from .optics.classification import Classification
@@ -80,9 +81,9 @@ class Renderer:
         return self._transfer
 
     @transfer.setter
-    def transfer(self, transfer: TransferFunction) -> None:
-        self._transfer = transfer
-        self._classification = Classification.of(transfer, self.volume)
+    def transfer(self, transfer: TransferFunction | None) -> None:
+        self._transfer = transfer or choose(self.volume).transfer
+        self._classification = Classification.of(self._transfer, self.volume)
         self.runs.classify(self._visibility())
 
     def composite(self, eye: Eye, walls: Sequence[Wall]) -> EyeImage:

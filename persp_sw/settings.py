@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from ._jit import max_threads
+from .arrays import number
 from .errors import SettingsError
 
 
@@ -48,16 +47,21 @@ class Settings:
     threads: int | None = None
 
     def __post_init__(self):
-        _check("quality", self.quality, 0.05, 8)
-        _check("residual", self.residual, 0, 0.5)
-        _check("single_face_tangent", self.single_face_tangent, 1, 8)
-        _check("max_intermediate", self.max_intermediate, 16, 16384)
-        if self.samples_per_interval not in (None, 1, 2, 4):
-            raise SettingsError(f"samples_per_interval is 1, 2 or 4; given {self.samples_per_interval!r}")
+        number(self.quality, "quality", SettingsError, 0.05, 8)
+        number(self.residual, "residual", SettingsError, 0, 0.5)
+        number(self.single_face_tangent, "single_face_tangent", SettingsError, 1, 8)
+        number(self.max_intermediate, "max_intermediate", SettingsError, 16, 16384)
+        self._check_whole("max_intermediate")
+        if self.samples_per_interval is not None:
+            self._check_whole("samples_per_interval")
+            if self.samples_per_interval not in (1, 2, 4):
+                raise SettingsError(f"samples_per_interval is 1, 2 or 4; given {self.samples_per_interval!r}")
         if self.threads is not None:
-            _check("threads", self.threads, 1, max_threads())
+            number(self.threads, "threads", SettingsError, 1, max_threads())
+            self._check_whole("threads")
 
-
-def _check(name: str, value: float, low: float, high: float) -> None:
-    if not (isinstance(value, (int, float, np.number)) and low <= value <= high):
-        raise SettingsError(f"{name} lies between {low:g} and {high:g}; given {value!r}")
+    def _check_whole(self, name: str) -> None:
+        value = getattr(self, name)
+        if number(value, name, SettingsError) != int(value):
+            raise SettingsError(f"{name} must be a whole number; given {value!r}")
+        object.__setattr__(self, name, int(value))

@@ -1,5 +1,7 @@
 """Eye images travel as bytes, and tell where their faces lie."""
 
+import io
+
 import numpy as np
 import pytest
 from tolerances import MATRIX
@@ -61,3 +63,45 @@ def test_quad_corners_project_to_the_faces_corners(image, rng):
             along = face.sign * direction[:, face.axis]
             i, j = (face.axis + 1) % 3, (face.axis + 2) % 3
             np.testing.assert_allclose(direction[:, [i, j]] / along[:, None], t, atol=MATRIX * 10)
+
+
+def saved(**arrays):
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)
+    return buffer.getvalue()
+
+
+GOOD = {
+    "eye": np.zeros(4),
+    "world_from_object": np.eye(4),
+    "faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2]]),
+    "pixels": np.zeros((4, 4), np.float32),
+    "samples": np.int64(0),
+}
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"faces": np.zeros(7)},
+        {"faces": np.array([[3, 1, 0, 0, 0.1, 2, 2.0]])},
+        {"faces": np.array([[0, 1, np.inf, 0, 0.1, 2, 2.0]])},
+        {"faces": np.array([[0, 1, 0, 0, 0, 2, 2.0]])},
+        {"pixels": np.zeros((4, 4))},
+        {"pixels": np.zeros((4, 3), np.float32)},
+        {"world_from_object": np.eye(3)},
+        {"samples": np.zeros(2)},
+        {"eye": np.full(4, np.nan)},
+    ],
+)
+def test_impossible_contents_are_refused(change):
+    EyeImage.from_bytes(saved(**GOOD))
+    with pytest.raises(ViewError):
+        EyeImage.from_bytes(saved(**{**GOOD, **change}))
+
+
+def test_another_numpy_file_is_refused():
+    buffer = io.BytesIO()
+    np.save(buffer, np.zeros(3))
+    with pytest.raises(ViewError, match="eye image"):
+        EyeImage.from_bytes(buffer.getvalue())

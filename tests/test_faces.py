@@ -100,10 +100,10 @@ def test_nothing_behind_or_beside_the_walls_costs_a_face():
 
 
 def test_several_walls_share_the_union():
-    volume = empty_volume()
-    eye = volume.centre + np.array([5.0, 3.0, 60.0])
-    left = View.look_at(eye, volume.centre - np.array([8, 0, 0]), (0, 1, 0), 10, (64, 64))
-    right = View.look_at(eye, volume.centre + np.array([8, 0, 0]), (0, 1, 0), 10, (64, 64))
+    volume = empty_volume((80, 90, 85))
+    eye = volume.centre + np.array([5.0, 3.0, 180.0])
+    left = View.look_at(eye, volume.centre - np.array([24, 0, 0]), (0, 1, 0), 10, (64, 64))
+    right = View.look_at(eye, volume.centre + np.array([24, 0, 0]), (0, 1, 0), 10, (64, 64))
     faces = [plan(geometry_of(volume, *views))[0] for views in ([left], [right], [left, right])]
     both = geometry_of(volume, left, right)
     assert covers(faces[2], np.concatenate([rays_that_meet(both, left), rays_that_meet(both, right)])).all()

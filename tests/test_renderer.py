@@ -7,7 +7,7 @@ import pytest
 from tolerances import FLOAT32_IMAGE, PICTURE_SMOOTH_DB, PICTURE_SURFACE_DB
 from views import DIRECTIONS, random_pose, view_of
 
-from persp_sw import Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
+from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
 from persp_sw.errors import EyeInsideVolumeError, SettingsError
 from persp_sw.measure.metrics import compare, psnr
 from persp_sw.volume.phantoms import synthetic_ct
@@ -199,7 +199,8 @@ def test_a_marker_lands_where_it_is_projected(rng):
 
 @pytest.mark.parametrize(
     "wrong",
-    [{"quality": 0}, {"quality": np.nan}, {"residual": -1}, {"samples_per_interval": 3}, {"threads": 0},
+    [{"quality": 0}, {"quality": np.nan}, {"threads": 1.5}, {"samples_per_interval": True},
+     {"samples_per_interval": "2"}, {"residual": -1}, {"samples_per_interval": 3}, {"threads": 0},
      {"single_face_tangent": 0.5}, {"max_intermediate": 5}, {"quality": "high"}],
 )  # fmt: skip
 def test_settings_out_of_range_are_refused(wrong):
@@ -220,3 +221,48 @@ def test_picture_and_wall_orientation():
     wall = Wall((-10, -10, 0), (10, -10, 0), (-10, 10, 0), (64, 64))
     assert np.abs(picture[:32, 32:].sum() - picture.sum()) < FLOAT32_IMAGE
     assert View.through_wall((0, 0, 30), wall).project([10, 10, 0]).tolist() == [64, 0]
+
+
+def test_an_eye_a_rounding_behind_a_slice_plane_reads_nothing_outside():
+    """float32 may put the last pixel's position below the packet's first voxel, where nothing may be read."""
+    s = 0.1
+    volume = Volume(np.full((64, 3, 3), 100, np.uint8), (s, s, s))
+    eye = np.array([1, 2.1, 3]) * s
+    view = View.look_at(eye, eye + (-0.3, -0.2, 1), (0, 1, 0), 120, (17, 9))
+    assert Renderer(volume, TransferFunction([(100, (1, 1, 1), 0.3)], s)).render(view).max() > 0
+
+
+@pytest.mark.parametrize("x", [31.3, 31.5, 31.7, 40])
+def test_a_wall_that_shows_nothing_of_the_volume_costs_nothing(x):
+    """Nor does it warn where its plane is parallel to the ray to the volume's middle, as in every CAVE."""
+    volume = Volume(np.full((64, 64, 64), 200, np.uint8))
+    eye, r = np.array([x, 31.5, 260.0]), 300.0
+    front = View.look_at(eye, (31.5, 31.5, 0), (0, 1, 0), 60, (64, 64)).wall
+    left = Wall(eye + (-r, -r, r), eye + (-r, -r, -r), eye + (-r, r, r), (64, 64))
+    renderer = Renderer(volume, TransferFunction(SMOOTH))
+    assert renderer.composite(Eye(eye), [front, left]).faces == renderer.composite(Eye(eye), [front]).faces
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 5])
+def test_the_smallest_pictures_are_right(size):
+    """A face is never so small that it is made of its margins: 16 pixels across a box of one pixel."""
+    volume = Volume(np.full((32, 32, 32), 200, np.uint8))
+    renderer = Renderer(volume, TransferFunction([(0, (1, 1, 1), 0.05)], 1.0), Settings(residual=0))
+    view = View.look_at(volume.centre + (20, 30, 90), volume.centre, (0, 1, 0), 45, (size, size))
+    error = renderer.render(view) - reference.render(volume, renderer.transfer, view)
+    # A bilinear 16² image of a box whose edges fall by 0.8 over few of its pixels.
+    assert np.sqrt(np.mean(error**2)) < 0.08
+
+
+def test_the_picture_does_not_depend_on_what_was_encoded_before():
+    volume = synthetic_ct(40)
+    view = view_of(volume, DIRECTIONS[0])
+    one, other = Renderer(volume, TransferFunction(SMOOTH)), Renderer(volume, TransferFunction(SMOOTH))
+    other.runs.report(0)
+    np.testing.assert_array_equal(one.render(view), other.render(view))
+
+
+def test_no_transfer_function_is_a_chosen_one_also_later():
+    renderer = Renderer(synthetic_ct(24), TransferFunction(SMOOTH))
+    renderer.transfer = None
+    assert renderer.transfer.points == Renderer(renderer.volume).transfer.points

@@ -132,3 +132,17 @@ def test_functions_constant_over_the_volume_need_one_entry():
     ):
         c = Classification.of(TransferFunction(points, 1.0), volume)
         assert len(c.table) == 2 and c.table[1, 3] == pytest.approx(np.log(2))
+
+
+def test_extremes_stay_within_float32():
+    tiny = Volume(np.array([0, 1e-38, 2e-38, 3e-38] * 2, np.float32).reshape(2, 2, 2))
+    c = Classification.of(TransferFunction([(0, RED, 0), (3e-38, RED, 0.5)], 1.0), tiny)
+    assert np.isfinite(np.float32(c.scale))
+    dense = Classification.of(TransferFunction([(0, RED, 1)], 1e-30), tiny)
+    assert np.isfinite(dense.table).all()
+    for points in ([(-1.7e308, RED, 0), (1.7e308, RED, 1)], [(0, RED, 0), (1e301, RED, 0)]):
+        with pytest.raises(TransferFunctionError, match="too large"):
+            TransferFunction(points)
+    for unit in ("1", True, 0.0):
+        with pytest.raises(TransferFunctionError, match="opacity_unit"):
+            TransferFunction([(0, RED, 0.5)], unit)

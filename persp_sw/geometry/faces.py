@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Matrix
+from ..kernels.scanline import STEEP
 from ..volume.levels import STANDARD_AXES
 from .view import View
 
-# Rays steeper than this take more samples in an interval (DESIGN section 3: ⌈|t| / 1.5⌉ samples).
-STEEP = 1.5
 # Part of a wall's pixels that may be finer than the pitch asked for: at grazing angles a few are 30× finer.
 _QUANTILE = 0.1
 # Points a side of the grid on which a wall's pixel size is measured.
@@ -195,14 +194,19 @@ def _face(
     quality: float,
     max_size: int,
 ) -> Face:
+    """The face that holds the rays to `points`, as far as their tangents are below `limit`."""
     t_i, t_j, distance = tangents(points[points[:, axis] * sign > 0], axis, sign).T
     low = np.clip([t_i.min(), t_j.min()], -limit, limit)
     high = np.clip([t_i.max(), t_j.max()], -limit, limit)
     pitch = max(_volume_pitch(distance), _wall_pitch(geometry, axis, sign)) / quality
     margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
-    limit = max_size // _WIDTH_STEP * _WIDTH_STEP
-    pitch = max(pitch, (high - low).max() / (limit - margin - 1))
-    width, height = (int(n) + margin for n in np.ceil((high - low) / pitch))
+    largest = (high - low).max()
+    # The width is a multiple of 16 anyway: use it, so that a small picture is not made of its own margins.
+    # The half keeps pixel centres off the box's silhouette, where nobody can decide.
+    pitch = min(pitch, largest / (_WIDTH_STEP - margin - 0.5) or pitch)
+    most = max_size // _WIDTH_STEP * _WIDTH_STEP
+    pitch = max(pitch, largest / (most - margin - 1))
+    width, height = (int(n) + margin for n in np.ceil((high - low) / pitch - 1e-9))
     width = -(-width // _WIDTH_STEP) * _WIDTH_STEP
     # Centred, so that a mirrored volume has the mirrored image.
     origin = (low + high) / 2 - np.array([width, height]) / 2 * pitch
@@ -231,13 +235,14 @@ def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int) -> f
     shown = _meets_box(directions, geometry.low - geometry.eye, geometry.high - geometry.eye)
     i, j, k = STANDARD_AXES[axis]
     shown &= directions[:, k] * sign > 0
-    if not shown.any():  # smaller than the grid: take its middle
-        directions = ((geometry.low + geometry.high) / 2 - geometry.eye)[None]
-        directions = directions / (np.linalg.inv(matrix) @ directions[0])[2]
-        if not directions[0, k] * sign > 0:
+    directions = directions[shown]
+    if not len(directions):  # nothing, or smaller than the grid: take the middle of what is seen
+        seen = np.concatenate([np.empty((0, 3)), *_seen_polygons(geometry, view)])
+        seen = seen[seen[:, k] * sign > 0]
+        if not len(seen):
             return 0.0
-    else:
-        directions = directions[shown]
+        middle = seen.mean(0, keepdims=True)
+        directions = middle / (np.linalg.inv(matrix) @ middle[0])[2]
     along = sign * directions[:, k, None]
     jacobian = np.stack(
         [

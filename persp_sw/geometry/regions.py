@@ -39,6 +39,8 @@ class Regions:
             if (crop[0::2] > crop[1::2]).any():
                 raise ViewError(f"crop is [x0, x1, y0, y1, z0, z1] with x0 ≤ x1 …; given {crop.tolist()}")
             object.__setattr__(self, "crop", tuple(crop.tolist()))
+        if not isinstance(self.clip, (Sequence, np.ndarray)) or isinstance(self.clip, str):
+            raise ViewError(f"clip is a list of planes [nx, ny, nz, d]; given {self.clip!r}")
         planes = tuple(tuple(vector(plane, "a clip plane", ViewError, 4).tolist()) for plane in self.clip)
         if any(not np.any(plane[:3]) for plane in planes):
             raise ViewError("a clip plane [nx, ny, nz, d] needs a normal that is not zero")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import Matrix, Points, Vector, vector
+from ..arrays import Matrix, Points, Vector, number, vector
 from ..errors import ViewError
 
 
@@ -27,8 +27,7 @@ class Eye:
 
     def __post_init__(self):
         object.__setattr__(self, "position", vector(self.position, "the eye's position", ViewError))
-        if not (np.isfinite(self.near) and self.near >= 0):
-            raise ViewError(f"the near distance must be a number ≥ 0; given {self.near!r}")
+        object.__setattr__(self, "near", number(self.near, "the near distance", ViewError, 0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,14 +54,7 @@ class Wall:
     def __post_init__(self):
         for corner in ("lower_left", "lower_right", "upper_left"):
             object.__setattr__(self, corner, vector(getattr(self, corner), f"the wall's {corner}", ViewError))
-        try:
-            width, height = (int(n) for n in self.pixels)
-            whole = (width, height) == tuple(self.pixels)
-        except (TypeError, ValueError):
-            raise ViewError(f"a wall's pixels are [width, height]; given {self.pixels!r}") from None
-        if not whole or not (1 <= width <= 16384 and 1 <= height <= 16384):
-            raise ViewError(f"a wall has 1 … 16384 whole pixels a side; given {self.pixels!r}")
-        object.__setattr__(self, "pixels", (width, height))
+        object.__setattr__(self, "pixels", _checked_pixels(self.pixels))
         across, up = self.lower_right - self.lower_left, self.upper_left - self.lower_left
         if np.linalg.norm(np.cross(across, up)) <= 1e-9 * np.linalg.norm(across) * np.linalg.norm(up):
             raise ViewError("a wall's three corners must not lie on one line")
@@ -74,6 +66,17 @@ class Wall:
         across = (self.lower_right - self.lower_left) / width
         down = (self.lower_left - self.upper_left) / height
         return np.column_stack([across, down, self.upper_left])
+
+
+def _checked_pixels(pixels: tuple[int, int]) -> tuple[int, int]:
+    try:
+        width, height = (int(n) for n in pixels)
+        whole = (width, height) == tuple(pixels)
+    except (TypeError, ValueError, OverflowError):
+        raise ViewError(f"a wall's pixels are [width, height]; given {pixels!r}") from None
+    if not whole or not (1 <= width <= 16384 and 1 <= height <= 16384):
+        raise ViewError(f"a wall has 1 … 16384 whole pixels a side; given {pixels!r}")
+    return width, height
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +139,8 @@ class View:
         position = vector(eye, "the eye's position", ViewError)
         forward = vector(centre, "the view's centre", ViewError) - position
         up = vector(up, "the up direction", ViewError)
-        if not (np.isfinite(fovy_deg) and 0 < fovy_deg < 180):
-            raise ViewError(f"fovy must lie between 0 and 180 degrees; given {fovy_deg!r}")
+        fovy_deg = number(fovy_deg, "fovy (degrees)", ViewError, 1e-6, 180 - 1e-6)
+        width, height = _checked_pixels(size)
         distance = np.linalg.norm(forward)
         if distance == 0:
             raise ViewError(f"eye and centre are the same point {position.tolist()}; move one of them")
@@ -149,7 +152,7 @@ class View:
         up = np.cross(right, forward)
         # The wall stands at the centre, so that its size and the scene's are alike whatever the unit.
         half_height = distance * np.tan(np.radians(fovy_deg) / 2)
-        half_width = half_height * size[0] / size[1]
+        half_width = half_height * width / height
         middle = position + forward * distance
         corner = [
             middle + sx * half_width * right + sy * half_height * up

@@ -56,6 +56,7 @@ from .scanline import (
     RUN_COLUMNS,
     SIGN,
     SLICE_WEIGHT,
+    STEEP,
     TILE,
     collect_planes,
     collect_runs,
@@ -126,7 +127,7 @@ def _composite_tile(
     _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges)
     nearest, farthest = _start_tile(n, base, residual, ranges, lanes)
     stride = most_per_interval // per_interval
-    last_cell = np.floor(box[1] - 1e-9)
+    last_cell = np.ceil(box[1]) - 1.0
     samples = 0
     for h in range(count):
         r = hits[tile, h]
@@ -149,8 +150,8 @@ def _composite_tile(
         if not fill_line(r, run_count, runs, weight_j, weight_k, voxels, first, last, line):
             continue
         sample(
-            n, line, _F(x_first - first), _F(x_step), _F(box[0] - first), _F(box[1] - first),
-            _F(last_cell - first), cells, lanes,
+            n, line, _F(x_first - first), _F(x_step), _F(max(box[0], first) - first),
+            _F(min(box[1], last) - first), _F(last - 1 - first), cells, lanes,
         )  # fmt: skip
         samples += n
         if not classify(n, table, origin, scale, cells, lanes):
@@ -175,7 +176,7 @@ def _composite_row(
         counts[tile] = 0
         t_left, t_right = face[ORIGIN_I] + tile * TILE * pitch, face[ORIGIN_I] + (tile + 1) * TILE * pitch
         steepest = max(max(abs(t_left), abs(t_right)), abs(t_j))
-        wanted = 4 if steepest > 3.0 else 2 if steepest > 1.5 else 1
+        wanted = 4 if steepest > 2.0 * STEEP else 2 if steepest > STEEP else 1
         tile_steps[tile] = min(max(wanted, np.int64(face[LEAST])), per_interval)
     count = collect_planes(t_j, face[E_J], face[E_K], face[SIGN], size_k, per_interval, box, planes)
     run_count = collect_runs(
@@ -229,7 +230,7 @@ def composite(
     metric
         float64 (3, 3), AᵀA of the linear part A of world_from_standard.
     box
-        float64 [i0, i1, j0, j1, k0, k1] of the shown voxel centres; look-ups are clamped to it.
+        float64 [i0, i1, j0, j1, k0, k1] of the shown voxel centres; look-ups along i and j are clamped to it.
     half_spaces
         float64 (n, 4): shown where a·(i, j, k) + a_0 ≥ 0; the box's six included.
     size_k

@@ -25,7 +25,7 @@ def block_bounds(rows, low, high):
     """Smallest and largest voxel of every block, NaN left out.
 
     `rows` [j, k, i]; `low` and `high` [n_j − 1, n_k, blocks] of the same type come filled with the type's
-    largest and smallest number (infinities for floats), which all-NaN blocks keep.
+    largest and smallest number, which all-NaN blocks keep.
     """
     n_i = rows.shape[2]
     for j in prange(low.shape[0]):

@@ -128,7 +128,7 @@ def blend(n, near, far, lanes):
         length = end - begin
         length = length if length > _F(0.0) else _F(0.0)
         # α = 1 − 2^y without cancellation: 2^y = 2^n·(1 + q), |q| small.
-        y = lanes[_SAMPLE_TAU + l] * lanes[LENGTH + l] * length * _MINUS_LOG2E
+        y = lanes[_SAMPLE_TAU + l] * (lanes[LENGTH + l] * length) * _MINUS_LOG2E
         y = y if y > _F(-126.0) else _F(-126.0)
         shifted = y + _ROUNDER
         f = y - (shifted - _ROUNDER)

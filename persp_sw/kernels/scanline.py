@@ -10,6 +10,7 @@ from .._jit import kernel, trailing_zeros
 from .encode import BLOCK, WORD, packed_position
 
 TILE = 16  # pixels in a packet: one 512-bit vector of floats
+STEEP = 1.5  # tangents beyond this take 2 samples in an interval, beyond twice this 4
 
 # `face`, see `composite.composite`.
 E_I, E_J, E_K, SIGN, ORIGIN_I, ORIGIN_J, PITCH, BASE, LEAST, NEAR = range(10)
@@ -52,7 +53,7 @@ def collect_planes(t_j, e_j, e_k, sign, size_k, per_interval, box, planes):
         distance = base + q / per_interval
         k = first_k + sign * (q / per_interval)
         j = min(max(e_j + t_j * distance, low_j), high_j)
-        row = min(np.floor(j), np.floor(high_j - 1e-9))
+        row = min(np.floor(j), np.ceil(high_j) - 1.0)
         slice_ = np.floor(k)
         planes[count, DISTANCE] = distance
         planes[count, ROW] = row
@@ -75,7 +76,7 @@ def collect_runs(
     e_i, t_0, pitch = face[E_I], face[ORIGIN_I], face[PITCH]
     tiles = counts.shape[0]
     first_block = np.int64(box[0]) // BLOCK
-    last_block = np.int64(box[1] - 1e-9) // BLOCK
+    last_block = np.int64(np.ceil(box[1]) - 1.0) // BLOCK
     # Pixels whose range begins or ends within half an interval read the nearest voxel of the box.
     beyond = 0.5 * max(abs(t_0), abs(t_0 + tiles * TILE * pitch)) + 0.01
     r = 0

@@ -14,6 +14,7 @@ from .transfer import TransferFunction
 _PER_LEVEL = 8
 # Entries for other data, over the values the function tells apart: 12 bits.
 _ENTRIES = 4096
+_LARGEST = float(np.finfo(np.float32).max)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +50,12 @@ class Classification:
             low, high = _told_apart(transfer, volume)
             origin, entries = low, _ENTRIES
             scale = (entries - 1) / (high - low) if high > low else 0.0
-        # A finite float64 step may overflow the scale of a denormal interval: one entry then says it all.
-        if not np.isfinite(scale):
+        if not scale <= _LARGEST:  # an interval of denormals: one entry says it all
             scale = 0.0
         values = origin + np.arange(entries) / scale if scale else np.full(1, origin)
         table = np.zeros((len(values) + 1, 4), np.float32)
         table[1:, :3] = transfer.colour(values)
-        table[1:, 3] = transfer.extinction(values)
+        table[1:, 3] = np.minimum(transfer.extinction(values), _LARGEST)
         seen = np.concatenate([[0], np.cumsum(table[:, 3] > 0)]).astype(np.int64)
         return cls(table, seen, origin, scale)
 

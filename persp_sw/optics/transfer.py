@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..arrays import number
 from ..errors import TransferFunctionError
 
 # An opacity of 1 would be an infinite extinction. 1 − 1e-6 per unit lets 1e-6 of the light through.
@@ -51,13 +52,13 @@ class TransferFunction:
         except (TypeError, ValueError):
             raise TransferFunctionError("control points are (value, (r, g, b), opacity)") from None
         _check_points(rows)
-        if opacity_unit is not None and not (np.isfinite(opacity_unit) and opacity_unit > 0):
-            raise TransferFunctionError(f"opacity_unit must be a length > 0; given {opacity_unit!r}")
+        if opacity_unit is not None:
+            opacity_unit = number(opacity_unit, "opacity_unit", TransferFunctionError, 1e-30, 1e30)
         set_ = object.__setattr__
         set_(self, "values", rows[:, 0])
         set_(self, "colours", rows[:, 1:4])
         set_(self, "opacities", rows[:, 4])
-        set_(self, "opacity_unit", None if opacity_unit is None else float(opacity_unit))
+        set_(self, "opacity_unit", opacity_unit)
 
     @property
     def points(self) -> list[tuple[float, tuple[float, float, float], float]]:
@@ -140,9 +141,12 @@ class TransferFunction:
 def _check_points(rows: NDArray[np.float64]) -> None:
     if rows.size == 0:
         raise TransferFunctionError("a transfer function needs at least one control point")
-    if not np.isfinite(rows).all():
-        bad = int(np.argmax(~np.isfinite(rows).all(1)))
-        raise TransferFunctionError(f"control point {bad} has a NaN or infinite number: {rows[bad].tolist()}")
+    bad = ~np.isfinite(rows).all(1) | (np.abs(rows[:, 0]) > 1e300)  # differences must be finite too
+    if bad.any():
+        first = int(np.argmax(bad))
+        raise TransferFunctionError(
+            f"control point {first} has a NaN or infinite or too large number: {rows[first].tolist()}"
+        )
     steps = np.diff(rows[:, 0])
     if (steps < 0).any():
         bad = int(np.argmax(steps < 0)) + 1

@@ -45,11 +45,6 @@ class BlockBounds:
         return self._bounds[axis]
 
     @property
-    def computed(self) -> tuple[int, ...]:
-        """Axes whose bounds are there already."""
-        return tuple(self._bounds)
-
-    @property
     def bytes(self) -> int:
         """Memory held."""
         return sum(low.nbytes + high.nbytes for low, high in self._bounds.values())

@@ -6,7 +6,7 @@ import numpy as np
 
 from .. import _jit
 from ..arrays import Image
-from ..compositor import EyeImage
+from ..eye_image import EyeImage
 from ..geometry.view import View
 from ..kernels.warp import FACE_COLUMNS, warp
 from ..volume.levels import STANDARD_AXES

@@ -1,0 +1,106 @@
+"""The eye image: what one eye sees of a volume, whatever the walls."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrays import Image, Matrix
+from .errors import ViewError
+from .geometry.faces import Face
+from .geometry.view import Eye
+from .volume.levels import STANDARD_AXES
+
+
+@dataclass(frozen=True, eq=False)
+class EyeImage:
+    """What one eye sees of the volume, whatever the walls: one image for each principal direction in use.
+
+    Attributes
+    ----------
+    eye
+        The eye it was composited for.
+    world_from_object
+        The volume's pose, (4, 4).
+    faces
+        Geometry of each face; `face_pixels(n)` are the pixels of face n.
+    pixels
+        (total, 4) float32 linear premultiplied RGBA: the faces' pixels one after the other, row by row.
+    samples
+        Voxel samples taken to make it.
+    """
+
+    eye: Eye
+    world_from_object: Matrix
+    faces: tuple[Face, ...]
+    pixels: NDArray[np.float32]
+    samples: int
+
+    def offset(self, number: int) -> int:
+        """Where face `number` begins in `pixels`."""
+        return sum(face.size[0] * face.size[1] for face in self.faces[:number])
+
+    def face_pixels(self, number: int) -> Image:
+        """(height, width, 4) view of face `number`; row v grows with t_j, column u with t_i."""
+        width, height = self.faces[number].size
+        start = self.offset(number)
+        return self.pixels[start : start + width * height].reshape(height, width, 4)
+
+    def world_from_tangents(self, number: int) -> Matrix:
+        """(3, 3): world direction of the ray (t_i, t_j, 1) of face `number`; the ray starts at the eye.
+
+        A quad with its corners at eye + world_from_tangents · (t_i, t_j, 1)·D shows the face, for any D > 0.
+        """
+        face = self.faces[number]
+        matrix = self.world_from_object[:3, list(STANDARD_AXES[face.axis])].copy()
+        matrix[:, 2] *= face.sign
+        return matrix
+
+    def to_bytes(self) -> bytes:
+        """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""
+        table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size) for f in self.faces]
+        buffer = io.BytesIO()
+        np.savez(
+            buffer,
+            eye=np.array([*self.eye.position, self.eye.near]),
+            world_from_object=self.world_from_object,
+            faces=np.array(table, np.float64).reshape(-1, 7),
+            pixels=self.pixels,
+            samples=np.int64(self.samples),
+        )
+        return buffer.getvalue()
+
+    @classmethod
+    def from_bytes(cls, data: bytes) -> EyeImage:
+        """Inverse of `to_bytes`; ViewError if the bytes are something else."""
+        try:
+            with np.load(io.BytesIO(data), allow_pickle=False) as file:
+                names = ("eye", "world_from_object", "faces", "pixels", "samples")
+                content = {name: file[name] for name in names}
+            shapes = {name: array.shape for name, array in content.items()}
+            pixels = content["pixels"]
+            fits = shapes["eye"] == (4,) and shapes["world_from_object"] == (4, 4) and shapes["samples"] == ()
+            if not (fits and pixels.ndim == 2 and pixels.shape[1] == 4 and pixels.dtype == np.float32):
+                raise ValueError(f"its arrays have the shapes {shapes}")
+            faces = tuple(_face(*row) for row in content["faces"].tolist())
+            *position, near = content["eye"].tolist()
+            samples = int(content["samples"])
+            image = cls(Eye(position, near), content["world_from_object"], faces, pixels, samples)
+        except (OSError, EOFError, ValueError, TypeError, KeyError, OverflowError, BadZipFile) as error:
+            raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
+        if image.offset(len(faces)) != len(pixels):
+            raise ViewError("this eye image's faces do not fit its pixels; it was damaged on the way")
+        return image
+
+
+def _face(
+    axis: float, sign: float, t_i: float, t_j: float, pitch: float, width: float, height: float
+) -> Face:
+    numbers = axis in (0, 1, 2) and sign in (-1, 1) and 0 < pitch < np.inf and width >= 2 and height >= 2
+    if not numbers or not np.isfinite([t_i, t_j, width, height]).all():
+        raise ValueError("a face of it is impossible")
+    return Face(int(axis), int(sign), (t_i, t_j), pitch, (int(width), int(height)))
