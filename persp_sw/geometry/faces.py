@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Matrix
-from ..kernels.scanline import STEEP
+from ..kernels.scanline import STEEP, TILE
 from ..volume.levels import STANDARD_AXES
 from .view import View
 
@@ -21,8 +21,6 @@ from .view import View
 _QUANTILE = 0.1
 # Points a side of the grid on which a wall's pixel size is measured.
 _GRID = 24
-# Packets are 16 pixels wide; see kernels/composite.py.
-_WIDTH_STEP = 16
 
 
 @dataclass(frozen=True)
@@ -201,13 +199,13 @@ def _face(
     pitch = max(_volume_pitch(distance), _wall_pitch(geometry, axis, sign)) / quality
     margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
     largest = (high - low).max()
-    # The width is a multiple of 16 anyway: use it, so that a small picture is not made of its own margins.
-    # The half keeps pixel centres off the box's silhouette, where nobody can decide.
-    pitch = min(pitch, largest / (_WIDTH_STEP - margin - 0.5) or pitch)
-    most = max_size // _WIDTH_STEP * _WIDTH_STEP
+    # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made of
+    # its own margins. The half keeps pixel centres off the box's silhouette, where nobody can decide.
+    pitch = min(pitch, largest / (TILE - margin - 0.5) or pitch)
+    most = max_size // TILE * TILE
     pitch = max(pitch, largest / (most - margin - 1))
     width, height = (int(n) + margin for n in np.ceil((high - low) / pitch - 1e-9))
-    width = -(-width // _WIDTH_STEP) * _WIDTH_STEP
+    width = -(-width // TILE) * TILE
     # Centred, so that a mirrored volume has the mirrored image.
     origin = (low + high) / 2 - np.array([width, height]) / 2 * pitch
     return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width, height))

@@ -64,11 +64,6 @@ class Classification:
         """Largest extinction of any entry, per world unit."""
         return float(self.table[:, 3].max())
 
-    @property
-    def is_transparent(self) -> bool:
-        """Whether no entry has any extinction."""
-        return bool(self.seen[-1] == 0)
-
 
 def _told_apart(transfer: TransferFunction, volume: Volume) -> tuple[float, float]:
     """The part of the volume's value range in which the function is not constant."""

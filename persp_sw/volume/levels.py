@@ -43,8 +43,3 @@ class BlockBounds:
             encode.block_bounds(rows, low, high)
             self._bounds[axis] = low, high
         return self._bounds[axis]
-
-    @property
-    def bytes(self) -> int:
-        """Memory held."""
-        return sum(low.nbytes + high.nbytes for low, high in self._bounds.values())
