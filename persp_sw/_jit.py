@@ -13,6 +13,10 @@ import tempfile
 import time
 from pathlib import Path
 
+import llvmlite.binding
+
+from .errors import SettingsError
+
 _PACKAGE = Path(__file__).parent
 
 
@@ -23,16 +27,33 @@ def _sources_hash() -> str:
     return digest.hexdigest()[:16]
 
 
+def _variant() -> str:
+    return f"{_sources_hash()}-{'vector' if VECTORS else 'portable'}"
+
+
 def _cache_folder() -> Path:
     home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    folder = Path(home) / "persp_sw" / f"kernels-{_sources_hash()}"
+    folder = Path(home) / "persp_sw" / f"kernels-{_variant()}"
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
-        folder = Path(tempfile.gettempdir()) / f"persp_sw-kernels-{os.getuid()}-{_sources_hash()}"
+        folder = Path(tempfile.gettempdir()) / f"persp_sw-kernels-{os.getuid()}-{_variant()}"
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 
+
+def _has_vectors() -> bool:
+    """Whether kernels may use AVX-512; PERSP_SW_KERNELS=portable says no, =vector insists."""
+    wanted = os.environ.get("PERSP_SW_KERNELS", "")
+    if wanted not in ("", "portable", "vector"):
+        raise SettingsError(f"PERSP_SW_KERNELS is 'portable' or 'vector'; given {wanted!r}")
+    if wanted or "NUMBA_CPU_NAME" in os.environ:  # numba compiles for another processor than this
+        return wanted == "vector"
+    features = llvmlite.binding.get_host_cpu_features()
+    return all(features.get(name, False) for name in ("avx512f", "avx512dq", "avx512bw", "avx512vl"))
+
+
+VECTORS = _has_vectors()
 
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_cache_folder()))
@@ -47,7 +68,10 @@ from numba.core import event  # noqa: E402
 from numba.extending import intrinsic  # noqa: E402
 
 __all__ = [
+    "VECTORS",
     "compile_seconds",
+    "inlined_kernel",
+    "intrinsic",
     "kernel",
     "max_threads",
     "parallel_kernel",
@@ -56,13 +80,17 @@ __all__ = [
     "prange",
     "set_threads",
     "trailing_zeros",
+    "types",
 ]
 
 # No fast-math: NaN marks voxels that are not there and must stay NaN. `contract` lets a*b + c fuse.
 _OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract"}, "error_model": "numpy"}
 
-kernel = numba.njit(**_OPTIONS)
+# Without `_nrt`, an array's references are counted, atomically, at every call: 10 ns each.
+kernel = numba.njit(_nrt=False, **_OPTIONS)
 parallel_kernel = numba.njit(parallel=True, **_OPTIONS)
+# An array is passed as eight numbers: a call with ten of them for every packet took longer than the packet.
+inlined_kernel = numba.njit(_nrt=False, forceinline=True, **_OPTIONS)
 
 
 @intrinsic

@@ -14,6 +14,7 @@ from .eye_image import EyeImage
 from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
+from .kernels.composite import Store, Table
 from .kernels.composite import composite as composite_face
 from .optics.classification import Classification
 from .settings import Settings
@@ -61,7 +62,7 @@ def composite_eye(
             single_face_tangent=settings.single_face_tangent,
             max_size=settings.max_intermediate,
         )
-    pixels = np.empty((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
+    pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
     samples, start = 0, 0
     for face in faces:
@@ -112,7 +113,8 @@ def _composite(
     low, high = (corner[axes] for corner in regions.box(volume))
     standard_eye = eye_object[axes]
     base = max(face.sign * ((low if face.sign > 0 else high)[2] - standard_eye[2]), 0.0)
-    geometry = np.array([*standard_eye, face.sign, *face.origin, face.pitch, base, least, eye.near])
+    e_i, e_j, e_k = standard_eye
+    geometry = np.array([e_i, e_j, 0.0, *face.origin, face.pitch, e_k, face.sign, base, least, eye.near])
     half_spaces = regions.half_spaces(volume)[:, [*axes, 3]]
     samples = np.zeros(out.shape[0], np.int64)
     _jit.set_threads(threads)
@@ -123,14 +125,8 @@ def _composite(
         np.ascontiguousarray(half_spaces),
         runs.size[2],
         per_interval,
-        runs.visible,
-        runs.pairs,
-        runs.needed,
-        runs.offsets,
-        runs.voxels,
-        classification.table,
-        np.float32(classification.origin),
-        np.float32(classification.scale),
+        Store(runs.visible, runs.pairs, runs.needed, runs.offsets, runs.voxels),
+        Table(classification.table, np.float32(classification.origin), np.float32(classification.scale)),
         np.float32(settings.residual),
         threads,
         samples,

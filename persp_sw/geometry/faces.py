@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Matrix
-from ..kernels.scanline import STEEP, TILE
+from ..kernels.scanline import STEEP
+from ..kernels.state import TILE
 from ..volume.levels import STANDARD_AXES
 from .view import View
 

@@ -1,96 +1,117 @@
 """The compositing kernel: runs of one principal axis to the pixels of one face of an eye image.
 
-All in standard space (i, j, k) of the face; see DESIGN section 3 in `docs/design.md`. Pixel (u, v) has the
-tangents t = t_0 + (u + ½, v + ½)·pitch; at distance D along k its ray is at i = e_i + t_i·D, j = e_j + t_j·D.
-Sample planes lie at D_q = sign·(k_q − e_k), k_q on slices and, for steep rays, between them. A plane stands
+All in standard space (i, j, k) of the face; see DESIGN section 3 in `docs/design.md`. At distance D along k
+the ray of pixel (u, v) is at i = o_i + t_i·D, j = o_j + t_j·D. For an eye at a finite place o is the eye and
+t = t_0 + (u + ½, v + ½)·pitch; for an eye at infinity t is the same for all pixels and o differs. Sample
+planes lie at D_q = sign·(k_q − e_k), k_q on slices and, for steep rays, between them. A plane stands
 for the part of [D_q − h, D_q + h] that lies in the ray's range [D_in, D_out], so α = 1 − exp(−τ·ℓ·length)
 with ℓ the world length of the ray in one slice interval: exact for a homogeneous medium. With several planes
 an interval their lengths 2h are in Simpson's proportion 1 : 2, slices first; equal lengths would favour the
 slices, where values are extreme, over the means between them (real CT, opaque: 45.4 instead of 42.4 dB).
 
 Structure, after measurements: one scanline of the image at a time; its planes' runs are projected to tiles of
-16 pixels, so that a tile knows its planes front to back and empty space costs nothing; a tile stays in the
-first-level cache until its pixels are opaque. In a packet (a tile on a plane) the voxel rows are interpolated
-along j (and k) first, over contiguous voxels; then along i; then all 16 pixels are blended as vectors. Blocks
-that are not visible read as NaN, which the table maps to "nothing".
-
-The kernel is split in small functions, as one it compiles longer: `scanline` finds what there is
-to sample, `packet` samples and blends it, and this file walks the picture.
+16 pixels, so that a tile knows its planes front to back and empty space costs nothing. Planes are taken 64 at
+a time, and no more once all tiles are opaque. In a packet (a tile on a run) the voxel rows are interpolated
+along j (and k) first, over contiguous voxels; then along i; then all 16 pixels are blended as vectors. Pixels
+outside the run are NaN, which the table maps to "nothing".
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import kernel, parallel_kernel, prange
-from .encode import BLOCK, WORD
-from .packet import (
-    ALPHA,
-    BLUE,
-    CHUNK,
-    ENOUGH,
-    GREEN,
-    LANES,
-    LENGTH,
-    RAY_FAR,
-    RAY_NEAR,
-    RED,
-    blend,
-    classify,
-    fill_line,
-    sample,
-)
+from .._jit import VECTORS, inlined_kernel, kernel, parallel_kernel, prange, trailing_zeros
+from .encode import BLOCK, packed_position
+from .packet_portable import SCRATCH, WINDOW
 from .scanline import (
     BASE,
+    CHUNK,
+    CORNER,
     DISTANCE,
-    E_I,
-    E_J,
-    E_K,
-    INDEX,
+    EYE_K,
     LEAST,
     NEAR,
+    NUMBER,
+    OFFSET_I,
+    OFFSET_J,
+    OFFSET_PITCH,
     ORIGIN_I,
     ORIGIN_J,
     PITCH,
-    PLANE,
-    PLANE_COLUMNS,
+    PLANE_ROWS,
+    ROW,
     ROW_WEIGHT,
-    RUN_COLUMNS,
     SIGN,
+    SLICE,
     SLICE_WEIGHT,
     STEEP,
-    TILE,
+    STEP,
     collect_planes,
-    collect_runs,
+    find_hits,
+    plane_range,
+    window,
 )
+from .state import ALPHA, ENOUGH, LENGTH, RAY_FAR, RAY_NEAR, SECTIONS, TILE
+
+if VECTORS:
+    from .packet_vector import blend, sample
+else:
+    from .packet_portable import blend, sample
 
 _F = np.float32
+_NONE, _ONE, _BLOCK = np.uint64(0), np.uint64(1), np.uint64(BLOCK)
+
+
+class Store(NamedTuple):
+    """The runs of one principal axis; see `volume.runs.AxisRuns`."""
+
+    visible: np.ndarray
+    pairs: np.ndarray
+    needed: np.ndarray
+    offsets: np.ndarray
+    voxels: np.ndarray
+
+
+class Table(NamedTuple):
+    """A transfer function; see `optics.classification.Classification`."""
+
+    rows: np.ndarray
+    origin: np.float32
+    scale: np.float32
+
+
+_FRESH, _GOING, _DONE = 0, 1, 2  # states of a tile
 
 
 @kernel
-def _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges):
+def _find_ranges(n, first, t_j, offset_j, face, metric, half_spaces, ranges):
     """Of each ray: nearest and farthest shown distance, and its world length in one slice interval.
 
     `ranges` float64 (3·n): the three one after the other; nearest > farthest where nothing is shown.
     """
-    e_i, e_j, e_k, sign, pitch, near = face[E_I], face[E_J], face[E_K], face[SIGN], face[PITCH], face[NEAR]
+    sign, pitch, offset_pitch = face[SIGN], face[PITCH], face[OFFSET_PITCH]
+    t_first = face[ORIGIN_I] + (first + 0.5) * pitch
+    offset_first = face[OFFSET_I] + (first + 0.5) * offset_pitch
     constant = metric[1, 1] * t_j * t_j + metric[2, 2] + 2.0 * sign * metric[1, 2] * t_j
     linear = 2.0 * (metric[0, 1] * t_j + sign * metric[0, 2])
     for l in range(np.uint64(n)):  # noqa: E741
         t_i = t_first + np.float64(l) * pitch
         # ℓ = ‖A·(t_i, t_j, sign)‖
         length = np.sqrt(constant + t_i * (linear + t_i * metric[0, 0]))
-        ranges[l] = near / length
+        ranges[l] = face[NEAR] / length
         ranges[np.uint64(n) + l] = np.inf
         ranges[np.uint64(2 * n) + l] = length
     for plane in range(half_spaces.shape[0]):
         a_i, a_j, a_k = half_spaces[plane, 0], half_spaces[plane, 1], half_spaces[plane, 2]
-        at_eye = a_i * e_i + a_j * e_j + a_k * e_k + half_spaces[plane, 3]
+        start = a_i * offset_first + a_j * offset_j + a_k * face[EYE_K] + half_spaces[plane, 3]
         across = a_j * t_j + a_k * sign
-        parallel = -np.inf if at_eye >= 0.0 else np.inf
         for l in range(np.uint64(n)):  # noqa: E741
+            at_start = start + a_i * (np.float64(l) * offset_pitch)
             slope = a_i * (t_first + np.float64(l) * pitch) + across
-            crossing = -at_eye / slope
+            crossing = -at_start / slope
             nearest = ranges[l]
             farthest = ranges[np.uint64(n) + l]
+            parallel = -np.inf if at_start >= 0.0 else np.inf
             enters = crossing if slope > 0.0 else parallel if slope == 0.0 else -np.inf
             leaves = crossing if slope < 0.0 else np.inf
             ranges[l] = enters if enters > nearest else nearest
@@ -98,135 +119,186 @@ def _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges):
 
 
 @kernel
-def _start_tile(n, base, residual, ranges, lanes):
-    """Clear the tile's pixels and note their ranges; returns the nearest and farthest distance of all."""
+def _start_tile(n, v, pixel, base, residual, ranges, out, lanes, at):
+    """Take up the tile's pixels and note their ranges; returns the nearest and farthest distance of all.
+
+    `out` holds what lies in front of them. Rays that show nothing or are opaque ask for no more.
+    """
     nearest, farthest = np.inf, -np.inf
     for lane in range(n):
         l = np.uint64(lane)  # noqa: E741
+        lane_at = np.uint64(at) + l
         near, far = ranges[l], ranges[np.uint64(n) + l]
-        lanes[RED + l] = lanes[GREEN + l] = lanes[BLUE + l] = lanes[ALPHA + l] = _F(0.0)
-        lanes[LENGTH + l] = _F(ranges[np.uint64(2 * n) + l])
-        if near < far:
+        for channel in range(4):
+            lanes[np.uint64(TILE * channel) + lane_at] = out[v, pixel + lane, channel]
+        lanes[LENGTH + lane_at] = _F(ranges[np.uint64(2 * n) + l])
+        if near < far and lanes[ALPHA + lane_at] < 1.0 - residual:
             nearest, farthest = min(nearest, near), max(farthest, far)
-            lanes[RAY_NEAR + l] = _F(near - base)
-            lanes[RAY_FAR + l] = _F(far - base)
-            lanes[ENOUGH + l] = _F(1.0 - residual)
+            lanes[RAY_NEAR + lane_at] = _F(near - base)
+            lanes[RAY_FAR + lane_at] = _F(far - base)
+            lanes[ENOUGH + lane_at] = _F(1.0 - residual)
         else:
-            lanes[RAY_NEAR + l] = lanes[RAY_FAR + l] = _F(0.0)
-            lanes[ENOUGH + l] = _F(-1.0)
+            lanes[RAY_NEAR + lane_at] = lanes[RAY_FAR + lane_at] = _F(0.0)
+            lanes[ENOUGH + lane_at] = _F(-1.0)
     return nearest, farthest
+
+
+@inlined_kernel
+def _composite_packet(
+    n, p, pixel, near, far, box, planes, masks, store, table, scratch, cells,
+    lanes, at,
+):  # fmt: skip
+    """A tile on plane p, which stands for [near, far]; returns samples taken and whether all is opaque."""
+    last_cell = np.ceil(box[1]) - 1.0
+    step = planes[STEP, p]
+    x_first = planes[CORNER, p] + (pixel + 0.5) * step
+    x_last = x_first + (n - 1) * step
+    start = np.floor(min(max(x_first, box[0]), last_cell))
+    first = np.uint64(np.int64(start))
+    end = np.uint64(np.int64(min(max(x_last, box[0]), last_cell))) + _ONE
+    j, k = np.uint64(planes[ROW, p]), np.uint64(planes[SLICE, p])
+    weight_j, weight_k = _F(planes[ROW_WEIGHT, p]), _F(planes[SLICE_WEIGHT, p])
+    samples = 0
+    block = first // _BLOCK
+    while block * _BLOCK < end:
+        bits = window(masks, p, block)
+        if bits == _NONE:
+            block += np.uint64(64)
+            continue
+        skipped = trailing_zeros(bits)
+        block += skipped
+        until = block + trailing_zeros(~(bits >> skipped))
+        begin, stop = max(block * _BLOCK, first), min(until * _BLOCK, end)
+        while begin < stop:
+            window_end = min(stop, begin + np.uint64(WINDOW - 1))
+            at_00 = packed_position(store.needed, store.offsets, j, k, begin)
+            at_10 = packed_position(store.needed, store.offsets, j + _ONE, k, begin)
+            at_01, at_11 = at_00, at_10
+            if weight_k != _F(0.0):
+                at_01 = packed_position(store.needed, store.offsets, j, k + _ONE, begin)
+                at_11 = packed_position(store.needed, store.offsets, j + _ONE, k + _ONE, begin)
+            sample(
+                n, np.int64(window_end - begin) + 1, store.voxels, at_00, at_10, at_01, at_11, weight_j, weight_k,
+                _F(x_first - start), _F(step), _F(box[0] - start), _F(box[1] - start), _F(last_cell - start),
+                _F(begin - first), _F(window_end - first), scratch, cells, lanes, at,
+            )  # fmt: skip
+            samples += n
+            begin = window_end
+            if blend(n, table.rows, table.origin, table.scale, near, far, scratch, cells, lanes, at):
+                return samples, True
+        block = until
+    return samples, False
 
 
 @kernel
 def _composite_tile(
-    n, t_j, t_first, per_interval, most_per_interval, face, metric, box, half_spaces, planes, tile, hits,
-    count, runs, run_count, voxels, table, origin, scale, residual, ranges, line, cells, lanes,
+    n, pixel, per_interval, stride_mask, nearest, farthest, base, box, planes, masks, hits, count, store, table, scratch, cells, lanes, at,
 ):  # fmt: skip
-    """One tile of n pixels through all its planes; returns the number of samples taken."""
-    base = face[BASE]
-    _find_ranges(n, t_first, t_j, face, metric, half_spaces, ranges)
-    nearest, farthest = _start_tile(n, base, residual, ranges, lanes)
-    stride = most_per_interval // per_interval
-    last_cell = np.ceil(box[1]) - 1.0
+    """A tile through the planes of a chunk that it hits; returns samples taken and whether it is done."""
+    stride = stride_mask + 1
     samples = 0
-    for h in range(count):
-        r = hits[tile, h]
-        p = runs[r, PLANE]
-        distance = planes[p, DISTANCE]
-        half = 0.5
-        if per_interval > 1:
-            on_even = (np.int64(planes[p, INDEX]) // stride) % 2 == 0
-            half = (1.0 if on_even else 2.0) / (3.0 * per_interval)
-        if distance - half >= farthest:
-            break
-        if distance + half <= nearest:
-            continue
-        x_first = face[E_I] + t_first * distance
-        x_step = face[PITCH] * distance
-        x_last = x_first + (n - 1) * x_step
-        first = np.int64(min(max(min(x_first, x_last), box[0]), last_cell))
-        last = np.int64(max(min(max(x_first, x_last), last_cell), box[0])) + 1
-        weight_j, weight_k = _F(planes[p, ROW_WEIGHT]), _F(planes[p, SLICE_WEIGHT])
-        if not fill_line(r, run_count, runs, weight_j, weight_k, voxels, first, last, line):
-            continue
-        sample(
-            n, line, _F(x_first - first), _F(x_step), _F(max(box[0], first) - first),
-            _F(min(box[1], last) - first), _F(last - 1 - first), cells, lanes,
-        )  # fmt: skip
-        samples += n
-        if not classify(n, table, origin, scale, cells, lanes):
-            continue
-        if blend(n, _F(distance - half - base), _F(distance + half - base), lanes):
-            break
-    return samples
+    for group in range((count + 7) // 8):
+        flags = hits[np.uint64(group)]
+        while flags:
+            p = np.uint64(8 * group) + (trailing_zeros(flags) >> np.uint64(3))
+            flags &= flags - _ONE
+            distance = planes[DISTANCE, p]
+            half = 0.5
+            if stride < per_interval:
+                on_even = np.int64(planes[NUMBER, p]) & stride == 0
+                half = (1.0 if on_even else 2.0) * stride / (3.0 * per_interval)
+            if distance - half >= farthest:
+                return samples, True
+            if distance + half <= nearest:
+                continue
+            taken, done = _composite_packet(
+                n, p, pixel, _F(distance - half - base), _F(distance + half - base), box, planes, masks, store, table, scratch, cells, lanes, at,
+            )  # fmt: skip
+            samples += taken
+            if done:
+                return samples, True
+    return samples, False
 
 
 @kernel
 def _composite_row(
-    v, face, metric, box, half_spaces, size_k, per_interval, visible, pairs, needed, offsets, voxels,
-    table, origin, scale, residual, planes, runs, tile_steps, hits, counts, ranges, line, cells,
-    lanes, out,
+    v, face, metric, box, half_spaces, size_k, per_interval, store, table, residual, planes, masks, states, strides, hits, ranges, depths, scratch, cells, lanes, out,
 ):  # fmt: skip
     """One scanline of the face; returns the number of samples taken."""
-    pitch = face[PITCH]
-    t_j = face[ORIGIN_J] + (v + 0.5) * pitch
+    t_j = face[ORIGIN_J] + (v + 0.5) * face[PITCH]
+    offset_j = face[OFFSET_J] + (v + 0.5) * face[OFFSET_PITCH]
     n = cells.shape[0]  # TILE, unknown to the compiler: a known 16 is unrolled before it can be vectorised
-    tiles = out.shape[1] // TILE
+    tiles = states.shape[0]
+    flags = hits.view(np.uint8)
+    # Pixels whose range begins or ends within half an interval read the nearest voxel of the box.
+    beyond = 0.5 * max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + tiles * TILE * face[PITCH])) + 0.01
     for tile in range(tiles):
-        counts[tile] = 0
-        t_left, t_right = face[ORIGIN_I] + tile * TILE * pitch, face[ORIGIN_I] + (tile + 1) * TILE * pitch
-        steepest = max(max(abs(t_left), abs(t_right)), abs(t_j))
+        states[tile] = _FRESH
+        t_left = face[ORIGIN_I] + tile * TILE * face[PITCH]
+        steepest = max(max(abs(t_left), abs(t_left + TILE * face[PITCH])), abs(t_j))
         wanted = 4 if steepest > 2.0 * STEEP else 2 if steepest > STEEP else 1
-        tile_steps[tile] = min(max(wanted, np.int64(face[LEAST])), per_interval)
-    count = collect_planes(t_j, face[E_J], face[E_K], face[SIGN], size_k, per_interval, box, planes)
-    run_count = collect_runs(
-        planes,
-        count,
-        face,
-        box,
-        per_interval,
-        tile_steps,
-        visible,
-        pairs,
-        needed,
-        offsets,
-        runs,
-        hits,
-        counts,
-    )
+        strides[tile] = per_interval // min(max(wanted, np.int64(face[LEAST])), per_interval) - 1
+    first_live, end_live = 0, tiles
+    first_plane, end_plane = plane_range(t_j, offset_j, face, size_k, per_interval, box)
     samples = 0
+    for first in range(first_plane, end_plane, CHUNK):
+        count = collect_planes(
+            first, min(first + CHUNK, end_plane), t_j, offset_j, face, size_k, per_interval, box, store.visible,
+            store.pairs, planes, masks,
+        )  # fmt: skip
+        if count == 0:
+            continue
+        for tile in range(first_live, end_live):
+            if states[tile] == _DONE:
+                continue
+            pixel, at = tile * TILE, tile * TILE * SECTIONS
+            find_hits(pixel, count, strides[tile], box, beyond, planes, masks, flags)
+            if states[tile] == _FRESH:
+                hit = _NONE
+                for group in range((count + 7) // 8):
+                    hit |= hits[np.uint64(group)]
+                if hit == _NONE:
+                    continue
+                states[tile] = _GOING
+                _find_ranges(n, pixel, t_j, offset_j, face, metric, half_spaces, ranges)
+                depths[tile, 0], depths[tile, 1] = _start_tile(
+                    n, v, pixel, face[BASE], residual, ranges, out, lanes, at
+                )
+            taken, done = _composite_tile(
+                n, pixel, per_interval, strides[tile], depths[tile, 0], depths[tile, 1], face[BASE], box, planes,
+                masks, hits, count, store, table, scratch, cells, lanes, at,
+            )  # fmt: skip
+            samples += taken
+            if done:
+                states[tile] = _DONE
+        while first_live < end_live and states[first_live] == _DONE:
+            first_live += 1
+        while first_live < end_live and states[end_live - 1] == _DONE:
+            end_live -= 1
+        if first_live == end_live:
+            break
     for tile in range(tiles):
-        first = tile * TILE
-        if counts[tile] == 0:
+        if states[tile] != _FRESH:
             for l in range(TILE):  # noqa: E741
                 for channel in range(4):
-                    out[v, first + l, channel] = _F(0.0)
-            continue
-        samples += _composite_tile(
-            n, t_j, face[ORIGIN_I] + (first + 0.5) * pitch, tile_steps[tile], per_interval, face, metric, box,
-            half_spaces, planes, tile, hits, counts[tile], runs, run_count, voxels, table, origin, scale,
-            residual, ranges, line, cells, lanes,
-        )  # fmt: skip
-        for l in range(TILE):  # noqa: E741
-            for channel in range(4):
-                out[v, first + l, channel] = lanes[TILE * channel + l]
+                    out[v, tile * TILE + l, channel] = lanes[tile * TILE * SECTIONS + TILE * channel + l]
     return samples
 
 
 @parallel_kernel
 def composite(
-    face, metric, box, half_spaces, size_k, per_interval, visible, pairs, needed, offsets, voxels,
-    table, origin, scale, residual, workers, samples, out,
+    face, metric, box, half_spaces, size_k, per_interval, store, table, residual, workers, samples, out,
 ):  # fmt: skip
-    """Composite one face of an eye image.
+    """Composite one face of an eye image behind what `out` already holds.
 
     Parameters
     ----------
     face
-        float64 [e_i, e_j, e_k, sign, t_0i, t_0j, pitch, base, least, near]: the eye, which way along k, the
-        tangents of the image's corner, the pixel pitch, a distance near the volume from which depths are
-        counted in float32, the least number of samples in an interval (1, 2 or 4), and the world distance
-        from the eye before which nothing is shown.
+        float64 [o_i, o_j, offset_pitch, t_0i, t_0j, pitch, e_k, sign, base, least, near]: of the image's
+        corner, the place of its ray at distance 0 and the tangents, with what both grow by a pixel (the
+        first 0 for an eye at a finite place, the second for one at infinity); k at distance 0; which way
+        along k; a distance near the volume from which depths are counted in float32; the least number of
+        samples in an interval (1, 2 or 4); and the world distance before which nothing is shown.
     metric
         float64 (3, 3), AᵀA of the linear part A of world_from_standard.
     box
@@ -237,9 +309,9 @@ def composite(
         Number of slices.
     per_interval
         Sample planes a slice interval at the steepest tile: 1, 2 or 4. More than 1 needs `pairs`.
-    visible, pairs, needed, offsets, voxels
+    store
         Arrays of `volume.runs.AxisRuns`.
-    table, origin, scale
+    table
         Of `optics.classification.Classification`; origin and scale float32.
     residual
         A packet stops when all its pixels let through no more than this.
@@ -248,23 +320,22 @@ def composite(
     samples
         int64 (height,): overwritten with the samples taken in each scanline.
     out
-        float32 (height, width, 4), width a multiple of 16; overwritten. Linear, premultiplied.
+        float32 (height, width, 4), width a multiple of 16: linear, premultiplied; what lies in front, added to.
     """
     for worker in prange(workers):
-        line = np.empty(BLOCK * WORD * visible.shape[2] + 2 * CHUNK, np.float32)
-        lanes = np.empty(LANES, np.float32)
-        ranges = np.empty(3 * TILE, np.float64)
-        cells = np.empty(TILE, np.int32)
         tiles = out.shape[1] // TILE
-        most = (size_k - 1) * per_interval + 1
-        planes = np.empty((most, PLANE_COLUMNS), np.float64)
-        runs = np.empty((most * (WORD // 2 * visible.shape[2] + 1), RUN_COLUMNS), np.int64)
-        tile_steps = np.empty(tiles, np.int64)
-        hits = np.empty((tiles, most), np.int64)
-        counts = np.empty(tiles, np.int64)
+        planes = np.empty((PLANE_ROWS, CHUNK), np.float64)
+        masks = np.zeros((CHUNK, store.visible.shape[2] + 1), np.uint64)
+        states = np.empty(tiles, np.int64)
+        strides = np.empty(tiles, np.int64)
+        hits = np.zeros(CHUNK // 8, np.uint64)
+        ranges = np.empty(3 * TILE, np.float64)
+        depths = np.empty((tiles, 2), np.float64)
+        scratch = np.empty(SCRATCH, np.float32)
+        cells = np.empty(TILE, np.int32)
+        lanes = np.empty(tiles * TILE * SECTIONS, np.float32)
         for v in range(worker, out.shape[0], workers):
             samples[v] = _composite_row(
-                v, face, metric, box, half_spaces, size_k, per_interval, visible, pairs, needed, offsets,
-                voxels, table, origin, scale, residual, planes, runs, tile_steps, hits, counts, ranges, line,
-                cells, lanes, out,
+                v, face, metric, box, half_spaces, size_k, per_interval, store, table, residual, planes, masks, states, strides, hits, ranges, depths, scratch, cells,
+                lanes, out,
             )  # fmt: skip

@@ -12,12 +12,12 @@ voxels 4s … 4e, the last of them shared with nobody.
 
 import numpy as np
 
-from .._jit import kernel, parallel_kernel, popcount, prange, trailing_zeros
+from .._jit import inlined_kernel, kernel, parallel_kernel, popcount, prange, trailing_zeros
 
 BLOCK = 4  # cells in a block
 WORD = 64  # blocks in a word
 
-_ONE = np.uint64(1)
+_ONE, _TWO = np.uint64(1), np.uint64(2)
 
 
 @parallel_kernel
@@ -174,12 +174,16 @@ def unpack(needed, offsets, voxels, rows, stored):
                         at += 1
 
 
-@kernel
-def packed_position(needed, offsets, j, k, w, s):
-    """Where the first voxel of block (w, s) of scanline (j, k) stands in the packed voxels."""
-    before = needed[j, k, w] & ((_ONE << np.uint64(s)) - _ONE)
-    ends = before & ~(needed[j, k, w] >> _ONE)
-    return offsets[j, k, w] + BLOCK * np.int64(popcount(before)) + np.int64(popcount(ends))
+@inlined_kernel
+def packed_position(needed, offsets, j, k, i):
+    """Where voxel i of scanline (j, k) stands in the packed voxels; its block must be stored. All uint64."""
+    block = i >> _TWO
+    w, s = block >> np.uint64(6), block & np.uint64(WORD - 1)
+    word = needed[j, k, w]
+    before = word & ((_ONE << s) - _ONE)
+    ends = before & ~(word >> _ONE)
+    stored = (popcount(before) << _TWO) + popcount(ends) + (i & np.uint64(BLOCK - 1))
+    return offsets[j, k, w] + np.int64(stored)
 
 
 @kernel

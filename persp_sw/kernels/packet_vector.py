@@ -1,0 +1,166 @@
+"""Packets on a processor with AVX-512: the functions of `packet_portable` as LLVM vectors.
+
+Same arguments, same results but for roundings where operations fuse differently. A packet spans at most
+`WINDOW` voxels of a row, so that the neighbours of all 16 pixels are found by permuting registers.
+"""
+
+import numpy as np
+from llvmlite import ir
+
+from .._jit import inlined_kernel, intrinsic, types
+from . import lanes as simd
+from .state import (
+    ALPHA,
+    BLUE,
+    ENOUGH,
+    EXP2_COEFFICIENTS,
+    GREEN,
+    LENGTH,
+    MINUS_LOG2E,
+    RAY_FAR,
+    RAY_NEAR,
+    RED,
+    ROUNDER,
+    TILE,
+    VALUE,
+)
+
+WINDOW = 64  # most voxels of a row that one packet may span: four registers
+_NARROW = 32  # where two registers do
+
+_WORD = ir.IntType(32)
+
+
+def _pointer(context, builder, array_type, array):
+    return context.make_array(array_type)(context, builder, array).data
+
+
+def _section(builder, at, section):
+    return builder.add(at, ir.Constant(ir.IntType(64), int(section)))
+
+
+def _sampler(registers, between):
+    """The sampler for windows of 16·registers voxels, on a slice or between two."""
+
+    @intrinsic
+    def sample_window(
+        _context, voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell,
+        begin, end, lanes, at,
+    ):  # fmt: skip
+        signed = getattr(voxels.dtype, "signed", True)
+
+        def build(context, builder, signature, arguments):
+            data = _pointer(context, builder, signature.args[0], arguments[0])
+            starts, scalars = arguments[1:5], arguments[5:14]
+            state, at = _pointer(context, builder, signature.args[14], arguments[14]), arguments[15]
+            weight_j, weight_k, x, step, low, high, last_cell, begin, end = (
+                simd.everywhere(builder, scalar) for scalar in scalars
+            )
+
+            def row(start, register):
+                return simd.load(builder, data, _section(builder, start, TILE * register), signed=signed)
+
+            line = []
+            for register in range(registers):
+                above, below = row(starts[0], register), row(starts[1], register)
+                value = above + weight_j * (below - above)
+                if between:
+                    above, below = row(starts[2], register), row(starts[3], register)
+                    value = value + weight_k * (above + weight_j * (below - above) - value)
+                line.append(value)
+            x = (simd.constant(builder, list(range(TILE))) * step + x).at_least(low).at_most(high)
+            cell = x.floor().at_most(last_cell)
+            shown = builder.and_(cell >= begin, cell < end)
+            left = _pick(builder, line, cell - begin)
+            right = _pick(builder, line, cell - begin + 1.0)
+            value = left + (x - cell) * (right - left)
+            simd.store(builder, simd.where(shown, value, np.nan), state, _section(builder, at, VALUE))
+            return context.get_dummy_value()
+
+        arguments = (voxels, *[types.int64] * 4, *[types.float32] * 9, lanes, types.int64)
+        return types.void(*arguments), build
+
+    return sample_window
+
+
+def _pick(builder, line, place):
+    """line[place] of a row of 32 or 64 numbers in registers."""
+    index = place.to_integers()
+    result = simd.permute(builder, line[0], line[1], index)
+    if len(line) == 4:
+        result = simd.where(place < 32.0, result, simd.permute(builder, line[2], line[3], index))
+    return result
+
+
+_on_slice, _on_slice_wide = _sampler(2, False), _sampler(4, False)
+_between, _between_wide = _sampler(2, True), _sampler(4, True)
+
+
+@inlined_kernel
+def sample(
+    n, width, voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell,
+    begin, end, scratch, cells, lanes, at,
+):  # fmt: skip
+    """See `packet_portable.sample`."""
+    if weight_k == np.float32(0.0):
+        if width <= _NARROW:
+            _on_slice(
+                voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
+                end, lanes, at,
+            )  # fmt: skip
+        else:
+            _on_slice_wide(
+                voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
+                end, lanes, at,
+            )  # fmt: skip
+    elif width <= _NARROW:
+        _between(
+            voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
+            end, lanes, at,
+        )  # fmt: skip
+    else:
+        _between_wide(
+            voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
+            end, lanes, at,
+        )  # fmt: skip
+
+
+@intrinsic
+def _blend(_context, table, origin, scale, last, near, far, lanes, at):
+    def build(context, builder, signature, arguments):
+        entries = _pointer(context, builder, signature.args[0], arguments[0])
+        origin, scale, last, near, far = (simd.everywhere(builder, scalar) for scalar in arguments[1:6])
+        state, at = _pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
+
+        def read(section):
+            return simd.load(builder, state, _section(builder, at, section))
+
+        value = read(VALUE)
+        entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
+        entry = simd.where(value.is_number(), entry, 0.0)
+        red, green, blue, extinction = simd.look_up(builder, entries, entry.to_integers())
+        length = (read(RAY_FAR).at_most(far) - read(RAY_NEAR).at_least(near)).at_least(0.0)
+        y = (extinction * (read(LENGTH) * length) * float(MINUS_LOG2E)).at_least(-126.0)
+        shifted = y + float(ROUNDER)
+        f = y - (shifted - float(ROUNDER))
+        *others, q = (float(c) for c in EXP2_COEFFICIENTS)
+        for coefficient in reversed(others):
+            q = f * q + coefficient
+        power = simd.power_of_two(builder, shifted)
+        alpha = (1.0 - power) - power * (f * q)
+        accumulated = read(ALPHA)
+        share = (1.0 - accumulated) * alpha
+        for section, colour in ((RED, red), (GREEN, green), (BLUE, blue)):
+            simd.store(builder, read(section) + share * colour, state, _section(builder, at, section))
+        accumulated = accumulated + share
+        simd.store(builder, accumulated, state, _section(builder, at, ALPHA))
+        return simd.none(builder, accumulated < read(ENOUGH))
+
+    arguments = (table, *[types.float32] * 5, lanes, types.int64)
+    return types.boolean(*arguments), build
+
+
+@inlined_kernel
+def blend(n, table, origin, scale, near, far, scratch, cells, lanes, at):
+    """See `packet_portable.blend`."""
+    return _blend(table, origin, scale, np.float32(table.shape[0] - 1), near, far, lanes, at)

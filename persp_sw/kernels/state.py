@@ -1,0 +1,27 @@
+"""The pixels of a tile while it is composited: sections of 16 floats in a row of `lanes`, and α's polynomial."""
+
+import numpy as np
+
+TILE = 16  # pixels in a tile: one 512-bit vector of floats
+
+# Accumulated colour and opacity; the ray's range, counted from `base`; the ray's world length in one slice
+# interval; the opacity at which it stops; the scalar of the sample being composited, NaN where there is none.
+RED, GREEN, BLUE, ALPHA, RAY_NEAR, RAY_FAR, LENGTH, ENOUGH, VALUE = (np.uint64(TILE * n) for n in range(9))
+SECTIONS = 9
+
+# α = 1 − 2^y is taken as 1 − 2^n·(1 + q) with q = 2^f − 1 = f·(c1 + f·(c2 + …)), |f| ≤ ½, the Taylor series
+# of exp(f·ln 2), remainder below 6e-9: no cancellation, so the faintest media keep their relative accuracy.
+MINUS_LOG2E = np.float32(-1.4426950408889634)
+ROUNDER = np.float32(12582912.0)  # 1.5·2^23: adding it leaves the nearest integer in the low bits
+EXP2_COEFFICIENTS = tuple(
+    np.float32(c)
+    for c in (
+        0.6931471805599453,
+        0.2402265069591007,
+        0.0555041086648216,
+        0.009618129107628,
+        0.0013333558146428,
+        0.000154035303933816,
+        1.5252733804059841e-05,
+    )
+)
