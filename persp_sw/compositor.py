@@ -12,6 +12,7 @@ from .arrays import Image
 from .errors import EyeInsideVolumeError
 from .eye_image import EyeImage
 from .geometry.faces import EyeGeometry, Face, plan_faces
+from .geometry.parts import Part, shown_parts
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
 from .kernels.composite import Store, Table
@@ -44,10 +45,9 @@ def composite_eye(
     pose = volume.world_from_object
     object_from_world = np.linalg.inv(pose)
     eye_object = object_from_world[:3, :3] @ eye.position + object_from_world[:3, 3]
-    seen = _seen_box(store, regions)
+    parts, low, high = _seen_parts(store, regions, eye_object)
     faces: list[Face] = []
-    if seen is not None:
-        low, high = seen
+    if parts:
         if (eye_object >= low).all() and (eye_object <= high).all():
             raise EyeInsideVolumeError(
                 f"the eye {eye.position.tolist()} is inside the visible part of the volume (voxel "
@@ -69,18 +69,33 @@ def composite_eye(
         width, height = face.size
         out = pixels[start : start + width * height].reshape(height, width, 4)
         start += width * height
-        samples += _composite(store, classification, regions, settings, eye, eye_object, face, threads, out)
+        for number, part in enumerate(parts):
+            pixels_of_part = out if number == 0 else np.empty_like(out)
+            samples += _composite(
+                store, classification, part, settings, eye, eye_object, face, threads, pixels_of_part
+            )
+            if number > 0:
+                _put_behind(out, pixels_of_part)
     return EyeImage(eye, pose, tuple(faces), pixels, samples)
 
 
-def _seen_box(store: RunStore, regions: Regions) -> tuple[NDArray, NDArray] | None:
-    """Object-space corners of what is neither cropped away nor transparent; None if nothing is left."""
-    low, high = regions.box(store.volume)
-    visible = store.visible_box() if (high - low > 0).all() else None
-    if visible is None:
-        return None
-    low, high = np.maximum(low, visible[0]), np.minimum(high, visible[1])
-    return (low, high) if (low <= high).all() else None
+def _seen_parts(
+    store: RunStore, regions: Regions, eye_object: NDArray[np.float64]
+) -> tuple[list[Part], NDArray[np.float64], NDArray[np.float64]]:
+    """The parts that are neither hidden nor transparent, front to back, and the object-space box of them."""
+    parts = shown_parts(regions, store.volume, np.append(eye_object, 1.0))
+    visible = store.visible_box() if parts else None
+    low, high = visible or (np.full(3, np.inf), np.full(3, -np.inf))
+    parts = [part for part in parts if (part.low <= high).all() and (part.high >= low).all()]
+    if parts:
+        low = np.min([np.maximum(part.low, low) for part in parts], axis=0)
+        high = np.max([np.minimum(part.high, high) for part in parts], axis=0)
+    return parts, low, high
+
+
+def _put_behind(front: Image, back: Image) -> None:
+    """`front` becomes front OVER back, premultiplied."""
+    front += (1 - front[..., 3:]) * back
 
 
 def _enough_samples(classification: Classification, linear: NDArray[np.float64]) -> int:
@@ -95,7 +110,7 @@ def _enough_samples(classification: Classification, linear: NDArray[np.float64])
 def _composite(
     store: RunStore,
     classification: Classification,
-    regions: Regions,
+    part: Part,
     settings: Settings,
     eye: Eye,
     eye_object: NDArray[np.float64],
@@ -103,19 +118,19 @@ def _composite(
     threads: int,
     out: Image,
 ) -> int:
-    """Composite one face into `out`; returns the samples taken."""
+    """Composite one part on one face into `out`; returns the samples taken."""
     volume = store.volume
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
     least = settings.samples_per_interval or _enough_samples(classification, linear)
     per_interval = face.samples_per_interval(least)
     runs = store.axis(face.axis, pairs=per_interval > 1)
-    low, high = (corner[axes] for corner in regions.box(volume))
+    low, high = part.low[axes], part.high[axes]
     standard_eye = eye_object[axes]
     base = max(face.sign * ((low if face.sign > 0 else high)[2] - standard_eye[2]), 0.0)
     e_i, e_j, e_k = standard_eye
     geometry = np.array([e_i, e_j, 0.0, *face.origin, face.pitch, e_k, face.sign, base, least, eye.near])
-    half_spaces = regions.half_spaces(volume)[:, [*axes, 3]]
+    half_spaces = part.half_spaces[:, [*axes, 3]]
     samples = np.zeros(out.shape[0], np.int64)
     _jit.set_threads(threads)
     composite_face(

@@ -116,10 +116,10 @@ def assert_exact(image, volume, regions, extinction):
 
 
 def assert_covered(image, volume, view, regions=None):
-    """Each of the view's rays that meets the shown box by a millionth of a voxel finds pixels to look up."""
+    """Each of the view's rays that meets what is shown by a millionth of a voxel finds pixels to look up."""
     ones = EyeImage(image.eye, image.world_from_object, image.faces, np.ones_like(image.pixels), 0)
     picture = warp_eye_image(ones, view)[..., 3]
-    entry, leave = shown_part(volume, view, Regions(crop=regions and regions.crop))
+    entry, leave = shown_part(volume, view, regions)
     assert (picture[leave - entry > 1e-6 * min(volume.spacing)] > 0.999).all()
 
 
