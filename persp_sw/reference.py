@@ -34,6 +34,9 @@ _VALUE, _CLEAR, _SLOPE, _RGB, _RGB_SLOPE, _COLUMNS = 0, 1, 2, 3, 6, 9
 # Columns of a ray's accumulator.
 _DEPTH, _CHANGE, _STATES = 3, 4, 5
 
+# What a plane is for, see `_planes_of`.
+_KEEP, _INSIDE, _OUTSIDE, _CROP, _SECOND = range(5)
+
 _MIN_CLEAR = 1 - MAX_OPACITY
 _ROOT15 = np.sqrt(15.0)
 
@@ -81,7 +84,7 @@ def render(
     view
         The eye may stand anywhere, inside the volume too; its near distance is measured along the ray.
     regions
-        Crop box and clip planes; None: the whole volume.
+        Crop, clip planes and slabs; None: the whole volume.
     tolerance
         Largest change of a pixel's RGBA that one more halving of all its pieces may make, 1e-12 … 0.1.
     threads
@@ -142,8 +145,7 @@ def render_with_report(
     regions = regions or Regions()
     width, height = view.size
     states = np.zeros((height, width, _STATES))
-    low, high = regions.box(volume)
-    if (low < high).all():
+    if min(volume.size) > 1:
         set_threads(threads or max_threads())
         _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
     change = states[..., _CHANGE]
@@ -163,7 +165,7 @@ def _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
     world_directions /= np.linalg.norm(world_directions, axis=-1, keepdims=True)
     directions = world_directions @ object_from_world[:3, :3].T  # objects' units a world unit along the ray
     data = volume.data.astype(np.float32, copy=False)  # exact for all voxel types, and one kernel for all
-    half_spaces = regions.half_spaces(volume)
+    planes, kinds = _planes_of(regions, volume)
     rows = max(1, _PIXELS_A_BAND // width)
     for first in range(0, height, rows):
         last = min(first + rows, height)
@@ -172,7 +174,9 @@ def _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
             eye,
             directions[first:last].reshape(-1, 3),
             float(view.eye.near),
-            half_spaces,
+            planes,
+            kinds,
+            regions.crop_flags,
             table,
             transfer.opacity_unit,
             float(tolerance),
@@ -180,6 +184,37 @@ def _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
         )
         if progress is not None:
             progress(last, height, "reference")
+
+
+def _planes_of(regions: Regions, volume: Volume):
+    """All planes that bound or divide what is shown, and what each is for.
+
+    Returns
+    -------
+    planes
+        (n, 4) rows in object space.
+    kinds
+        (n,): _KEEP, shown only where a·p + a_0 ≥ 0; _INSIDE and _OUTSIDE, the first of a slab's two rows, of
+        which both or not both must be ≥ 0; _CROP, the first of an axis' two rows a·p − x0 and a·p − x1, the
+        axes in the order x, y, z; _SECOND, the second of the two.
+    """
+    pose = volume.world_from_object
+    rows, kinds = [], []
+    for axis, unit in enumerate(np.eye(3)):
+        rows += [(*unit, 0.0), (*-unit, volume.size[axis] - 1.0)]
+        kinds += [_KEEP, _KEEP]
+    for plane in regions.clip:
+        rows.append(np.array(plane) @ pose)
+        kinds.append(_KEEP)
+    for cut in regions.cut:
+        plane, reach = np.array(cut.plane), cut.thickness / 2 * np.linalg.norm(cut.plane[:3])
+        rows += [(plane + (0, 0, 0, reach)) @ pose, ((0, 0, 0, reach) - plane) @ pose]
+        kinds += [_INSIDE if cut.show == "inside" else _OUTSIDE, _SECOND]
+    for axis, unit in enumerate(np.eye(3)):
+        if regions.crop is not None:
+            rows += [(*unit, -x) for x in regions.crop[2 * axis : 2 * axis + 2]]
+            kinds += [_CROP, _SECOND]
+    return np.array(rows, np.float64), np.array(kinds)
 
 
 def _pieces_of(transfer: TransferFunction):
@@ -221,36 +256,83 @@ def _pieces_of(transfer: TransferFunction):
 
 
 @parallel_kernel
-def _cast_band(data, eye, directions, near, half_spaces, table, unit, tolerance, states):
+def _cast_band(data, eye, directions, near, planes, kinds, crop_flags, table, unit, tolerance, states):
     for pixel in prange(len(directions)):
         direction, state = directions[pixel], states[pixel]
-        entry, leave = _shown_part(eye, direction, near, half_spaces)
+        ends = np.empty(len(planes) + 2)
+        count = _cut_ray(eye, direction, near, planes, kinds, ends)
         piece_tolerance = tolerance / 32
         for _ in range(_ATTEMPTS):
-            if not entry < leave:
-                break
             state[:] = 0.0
-            _cast_ray(data, eye, direction, entry, leave, table, unit, piece_tolerance, state)
+            for n in range(count - 1):
+                middle = 0.5 * (ends[n] + ends[n + 1])
+                if ends[n] < ends[n + 1] and _is_shown(eye, direction, middle, planes, kinds, crop_flags):
+                    _cast_ray(data, eye, direction, ends[n], ends[n + 1], table, unit, piece_tolerance, state)
             if state[_CHANGE] <= tolerance:
                 break
             piece_tolerance /= 16
 
 
 @kernel
-def _shown_part(eye, direction, near, half_spaces):
-    """World distances from the eye between which the ray lies in all half-spaces; entry ≥ leave: nowhere."""
+def _at(eye, direction, distance, plane):
+    """a·p + a_0 on the ray; the eye's where the ray runs along the plane, which no rounding then disturbs."""
+    offset = plane[0] * eye[0] + plane[1] * eye[1] + plane[2] * eye[2] + plane[3]
+    slope = plane[0] * direction[0] + plane[1] * direction[1] + plane[2] * direction[2]
+    return offset + slope * distance if slope != 0 else offset
+
+
+@kernel
+def _cut_ray(eye, direction, near, planes, kinds, ends):
+    """Fill `ends` with the distances at which the ray may begin or cease to be shown, ascending; how many."""
     entry, leave = near, np.inf
-    for k in range(len(half_spaces)):
-        a = half_spaces[k]
-        offset = a[0] * eye[0] + a[1] * eye[1] + a[2] * eye[2] + a[3]
-        slope = a[0] * direction[0] + a[1] * direction[1] + a[2] * direction[2]
-        if slope > 0:
-            entry = max(entry, -offset / slope)
+    count = 0
+    for k in range(len(planes)):
+        plane = planes[k]
+        slope = plane[0] * direction[0] + plane[1] * direction[1] + plane[2] * direction[2]
+        crossing = -_at(eye, direction, 0.0, plane) / slope if slope != 0 else -np.inf
+        if kinds[k] != _KEEP:
+            ends[count] = crossing
+            count += 1
+        elif slope > 0:
+            entry = max(entry, crossing)
         elif slope < 0:
-            leave = min(leave, -offset / slope)
-        elif offset < 0:
-            return 1.0, 0.0
-    return entry, leave
+            leave = min(leave, crossing)
+        elif _at(eye, direction, 0.0, plane) < 0:
+            return 0
+    if not entry < leave:
+        return 0
+    for n in range(count):
+        ends[n] = min(max(ends[n], entry), leave)
+    ends[count], ends[count + 1] = entry, leave
+    count += 2
+    for n in range(1, count):  # insertion sort: a handful of numbers
+        value, m = ends[n], n - 1
+        while m >= 0 and ends[m] > value:
+            ends[m + 1] = ends[m]
+            m -= 1
+        ends[m + 1] = value
+    return count
+
+
+@kernel
+def _is_shown(eye, direction, distance, planes, kinds, crop_flags):
+    """Whether slabs and crop show the ray's point at a distance; what only keeps one side is not asked.
+
+    A ray in a border is in the slab or the box, if that has a thickness.
+    """
+    region, weight = 0, 1
+    for k in range(len(planes)):
+        kind = kinds[k]
+        if kind in (_KEEP, _SECOND):
+            continue
+        first = _at(eye, direction, distance, planes[k])
+        second = _at(eye, direction, distance, planes[k + 1])
+        if kind == _CROP:
+            region += weight * (0 if first < 0 else 1 if second < 0 or second == 0 < first else 2)
+            weight *= 3
+        elif (first >= 0 and second >= 0 and first + second > 0) != (kind == _INSIDE):
+            return False
+    return weight == 1 or (crop_flags >> region) & 1 == 1
 
 
 @kernel
