@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from . import images, reference
     from .errors import PerspSWError
     from .eye_image import EyeImage
-    from .geometry.regions import Regions
+    from .geometry.regions import Cut, Regions
     from .geometry.view import Eye, View, Wall
     from .optics.transfer import TransferFunction
     from .renderer import Renderer
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .volume.grid import Volume
 
 __all__ = [
+    "Cut",
     "Eye",
     "EyeImage",
     "PerspSWError",
@@ -42,6 +43,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOME = {
+    "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
     "PerspSWError": ".errors",

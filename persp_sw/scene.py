@@ -148,8 +148,8 @@ class Scene:
 
     @cached_property
     def regions(self) -> Regions:
-        """Crop box and clip planes."""
-        return Regions(self.keys.crop, self.keys.clip)
+        """Crop, clip planes and slabs."""
+        return Regions(self.keys.crop, self.keys.clip, self.keys.cut, self.keys.crop_flags)
 
     @property
     def background(self) -> NDArray[np.float64]:
@@ -245,6 +245,10 @@ class Scene:
             near = difflib.get_close_matches(keys.tf.lower(), presets.NAMES, 1, 0.5)
             advice = f"did you mean {near[0]}?" if near else f"the presets are {', '.join(presets.NAMES)}"
             problems.append(f"tf: {keys.tf!r} is neither a preset nor a file {self._path(keys.tf)}; {advice}")
+        try:
+            Regions(keys.crop, crop_flags=keys.crop_flags)
+        except PerspSWError as error:
+            problems.append(f"crop_flags: {error}")
         if keys.eye and keys.centre:
             for frame in sorted({0, keys.frames if keys.eye_step else 0}):
                 eye = np.array(keys.eye) + frame * np.array(keys.eye_step or (0, 0, 0))

@@ -54,6 +54,8 @@ class SceneKeys(BaseModel):
     opacity_unit: Positive | None = None
     clip: list[tuple[Number, Number, Number, Number]] = []
     crop: tuple[Number, Number, Number, Number, Number, Number] | None = None
+    crop_flags: Any = "subvolume"  # a name or a number; like `cut`, checked in the words of `Regions`
+    cut: list[Any] = []
     shade: Annotated[bool, Field(strict=True)] = False
     light: Light = Light()
     background: tuple[Unit, Unit, Unit] = (0.0, 0.0, 0.0)
@@ -103,6 +105,16 @@ class SceneKeys(BaseModel):
     @classmethod
     def _crop(cls, value: Any) -> Any:
         return _accepted(lambda crop: Regions(crop=crop), value)
+
+    @field_validator("crop_flags")
+    @classmethod
+    def _crop_flags(cls, value: Any) -> Any:
+        return _accepted(lambda flags: Regions(crop=[0] * 6, crop_flags=flags), value)
+
+    @field_validator("cut")
+    @classmethod
+    def _cut(cls, value: Any) -> Any:
+        return _accepted(lambda cut: Regions(cut=cut), value)
 
     @field_validator("shade")
     @classmethod

@@ -45,6 +45,30 @@ _VIEW_OPTIONS = [
     click.option("--background", type=float, nargs=3, metavar="R G B", help="Linear colour behind, 0 … 1."),
     click.option("--frames", type=int, metavar="N", help="Frames to time."),
 ]
+_REGION_OPTIONS = [
+    click.option("--crop", type=float, nargs=6, metavar="X0 X1 Y0 Y1 Z0 Z1", help="Crop box, voxel index."),
+    click.option(
+        "--crop-flags",
+        metavar="NAME|N",
+        help="Which of the 27 regions that the crop's planes make: 27 bits, or subvolume (the box), fence, "
+        "inverted_fence, cross, inverted_cross.",
+    ),
+    click.option(
+        "--clip",
+        type=float,
+        nargs=4,
+        multiple=True,
+        metavar="A B C D",
+        help="Show where A x + B y + C z + D ≥ 0, world; may be repeated.",
+    ),
+    click.option(
+        "--cut",
+        type=(float, float, float, float, float, click.Choice(["inside", "outside"])),
+        multiple=True,
+        metavar="A B C D T inside|outside",
+        help="Show only what is inside, or outside, a slab T thick around a plane; may be repeated.",
+    ),
+]
 _SETTING_OPTIONS = [
     click.option(
         "--quality", type=float, default=1.0, show_default=True, help="Sharpness of the eye image, 0.05 … 8."
@@ -71,6 +95,11 @@ def view_options(function: Function) -> Function:
     return _decorated(function, _VIEW_OPTIONS)
 
 
+def region_options(function: Function) -> Function:
+    """Which part is shown; over the scene file's keys."""
+    return _decorated(function, _REGION_OPTIONS)
+
+
 def setting_options(function: Function) -> Function:
     """Speed and accuracy."""
     return _decorated(function, _SETTING_OPTIONS)
@@ -85,7 +114,11 @@ def json_option(function: Function) -> Function:
 
 def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
     """The scene of a scene file (.json, .toml) or of a volume file; what is `given` replaces its keys."""
-    keys = {name: value for name, value in given.items() if value is not None}
+    keys = {name: value for name, value in given.items() if value is not None and value != ()}
+    if "cut" in keys:
+        keys["cut"] = [{"plane": cut[:4], "thickness": cut[4], "show": cut[5]} for cut in keys["cut"]]
+    if keys.get("crop_flags", "")[:1].isdecimal():
+        keys["crop_flags"] = _whole(keys["crop_flags"])
     for name in ("component", "series"):
         if str(keys.get(name, "")).isdecimal():
             keys[name] = int(keys[name])
@@ -94,6 +127,13 @@ def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
     if Path(path).suffix.lower() in (".json", ".toml"):
         return Scene.load(path, progress=progress, **keys)
     return Scene.of_file(path, progress=progress, **keys)
+
+
+def _whole(text: str) -> int:
+    try:
+        return int(text, 0)  # 0x… and 0b… too
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is no whole number", param_hint="--crop-flags") from None
 
 
 def say_missing_voxels(volume: Volume) -> None:

@@ -13,6 +13,7 @@ from ..scene import Scene
 from .options import (
     json_option,
     open_scene,
+    region_options,
     say_missing_voxels,
     setting_options,
     view_options,
@@ -26,6 +27,7 @@ Examples:
   persp-sw render head.nrrd -o head.png
   persp-sw render head.nrrd --preset ct_bone --eye 0 -600 200 --size 1024 768
   persp-sw render scene.toml --quality 2 --samples 2 --reference
+  persp-sw render head.nrrd --clip 1 0 0 -90 --cut 0 0.2 1 -60 10 outside
   persp-sw render scene.json --reference --json > result.json
 
 \b
@@ -52,6 +54,7 @@ comes before them. --quality and --samples change speed and error, never the loo
 )
 @setting_options
 @view_options
+@region_options
 @volume_options
 @json_option
 def render(

@@ -27,14 +27,17 @@ def shown_part(volume: Volume, view: View, regions: Regions | None = None) -> tu
     Returns
     -------
     Two (height, width) arrays of world distances from the eye, not below its near distance; equal where the
-    ray misses.
+    ray misses. ValueError where `regions` are not convex, for then one interval cannot tell.
     """
+    regions = regions or Regions()
+    if not regions.convex:
+        raise ValueError("what these regions show is not convex: a ray may meet it several times")
     object_from_world = np.linalg.inv(volume.world_from_object)
     eye = object_from_world @ np.append(view.eye.position, 1)
     directions = _unit_directions(view) @ object_from_world[:3, :3].T
     entry = np.full(directions.shape[:2], view.eye.near)
     leave = np.full(directions.shape[:2], np.inf)
-    for plane in (regions or Regions()).half_spaces(volume):
+    for plane in regions.half_spaces(volume):
         offset, slope = plane @ eye, directions @ plane[:3]
         with np.errstate(divide="ignore", invalid="ignore"):
             crossing = -offset / slope
