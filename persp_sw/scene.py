@@ -267,12 +267,14 @@ def _json(keys: Mapping[str, Any]) -> str:
 
 
 def _toml(keys: Mapping[str, Any]) -> str:
-    """The same in TOML: its texts, numbers, booleans and lists are written as JSON's, its tables inline."""
-    lines = []
-    for key, value in keys.items():
-        if isinstance(value, dict):
-            pairs = ", ".join(f"{name} = {json.dumps(item)}" for name, item in value.items())
-            lines.append(f"{key} = {{{pairs}}}")
-        elif value is not None:
-            lines.append(f"{key} = {json.dumps(value, ensure_ascii=False)}")
-    return "\n".join(lines) + "\n"
+    """The same in TOML."""
+    return "".join(f"{key} = {_toml_value(value)}\n" for key, value in keys.items() if value is not None)
+
+
+def _toml_value(value: Any) -> str:
+    """Texts, numbers and booleans are written as JSON's; tables inline."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name} = {_toml_value(item)}" for name, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_toml_value, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from dicom_writer import dicom, slice_tags
 from PIL import Image
-from samples import ROOT, ball, result_of, run
+from samples import ROOT, ball, fails, result_of, run
 
 import persp_sw as psw
 from persp_sw import cli
@@ -251,6 +251,20 @@ def test_options_replace_the_scenes_keys(scene_file: Path, tmp_path: Path):
     options = ("--eye", -40, -50, 11, "--centre", 11, 11, 11, "--up", 0, 1, 0, "--fovy", 20, "--frames", 4)
     values = result_of("render", scene_file, "-o", out, *options, "--size", 20, 10, "--preset", "fog")
     assert (values["timed_frames"], values["size"], values["preset"]) == (4, [20, 10], "fog")
+
+
+def test_regions_by_option(scene_file: Path, tmp_path: Path):
+    out = tmp_path / "a.npy"
+    whole = result_of("render", scene_file, "-o", out)["samples"]
+    box = ("--crop", 6, 17.5, 6, 17.5, 6, 17.5)
+    for flags in ("fence", 0x2EBFEBA, "0x2ebfeba"):
+        fence = result_of("render", scene_file, "-o", out, *box, "--crop-flags", flags)["samples"]
+        assert fence not in (whole, 0)
+    slab = result_of("render", scene_file, "-o", out, "--cut", 0, 0, 1, -12, 2, "inside")["samples"]
+    assert 0 < slab < whole
+    nothing = ("--clip", 0, 0, 1, -12, "--clip", 0, 0, -1, 11)
+    assert result_of("render", scene_file, "-o", out, *nothing)["samples"] == 0
+    assert "27 bits" in fails("render", scene_file, *box, "--crop-flags", "hedge")
 
 
 def test_a_saved_transfer_function_is_relative_to_here(ball_file: Path, tmp_path: Path, monkeypatch):

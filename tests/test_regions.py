@@ -412,10 +412,10 @@ def test_what_is_hidden_is_not_sampled():
             return composite(volume, HAZE, view, regions, quality=8).samples
 
         whole = samples(Regions())
-        assert samples(Regions(clip=[(1, 0.2, 0.1, -25)])) < 0.65 * whole  # 45 % are left
+        assert samples(Regions(clip=[(1, 0.2, 0.1, -25)])) < 0.75 * whole  # 45 % of the volume is left
         assert samples(Regions(cut=[Cut((1, 0.2, 0.1, -25), 4, "inside")])) < 0.3 * whole
         assert samples(Regions(cut=[Cut((1, 0.2, 0.1, -25), 20, "outside")])) < 0.75 * whole
-        assert samples(Regions((13, 26, 13, 26, 13, 26), crop_flags="inverted_fence")) < 0.6 * whole  # 30 %
+        assert samples(Regions((13, 26, 13, 26, 13, 26), crop_flags="inverted_fence")) < 0.5 * whole  # 30 %
         assert samples(Regions(clip=[(1, 0, 0, -25), (-1, 0, 0, 24)])) == 0
 
 

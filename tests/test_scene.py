@@ -33,6 +33,8 @@ FULL = {
     "light": {"ambient": 0.3},
     "clip": [[1, 0, 0, -3]],
     "crop": [0, 20, 1, 21, 2, 22],
+    "crop_flags": "fence",
+    "cut": [{"plane": [0, 0, 1, -5], "thickness": 2, "show": "outside"}],
     "background": [0.1, 0.2, 0.3],
     "max_seconds": 6,
 }
@@ -50,7 +52,8 @@ def test_every_key_arrives(ball_file: Path):
     assert scene.volume.data.shape == (24, 24, 24)
     assert scene.volume.spacing == (1, 2, 3)
     assert scene.transfer.to_dict() == {"tf": ROWS, "opacity_unit": 2.5}
-    assert scene.regions == psw.Regions((0, 20, 1, 21, 2, 22), [(1, 0, 0, -3)])
+    slab = psw.Cut((0, 0, 1, -5), 2, "outside")
+    assert scene.regions == psw.Regions((0, 20, 1, 21, 2, 22), [(1, 0, 0, -3)], [slab], "fence")
     assert scene.background.tolist() == [0.1, 0.2, 0.3]
     assert (scene.frames, scene.animated, scene.step, scene.max_seconds) == (4, True, 0.5, 6)
     view, expected = scene.view(0), psw.View.look_at((100, 20, 30), (11, 22, 33), (0, 0, 1), 40, (64, 48))
@@ -201,6 +204,8 @@ def test_all_problems_are_listed_at_once(ball_file: Path):
         "background": [0, 0, 3],
         "light": {"ambiant": 1},
         "clip": [[0, 0, 0, 1]],
+        "cut": [{"plane": [0, 0, 1, 3]}],
+        "crop_flags": "fenc",
     }
     with pytest.raises(SceneError) as caught:
         psw.Scene.load(written(ball_file.parent, bad))
@@ -220,9 +225,11 @@ def test_all_problems_are_listed_at_once(ball_file: Path):
         "background[2]: expected a number at most 1",
         "light.ambiant: unknown key; did you mean ambient?",
         "clip: a clip plane",
+        "cut: a cut is {plane",
+        "crop_flags: crop_flags is a whole number of 27 bits",
     ):
         assert words in text
-    assert "scene.json has 14 problems" in text
+    assert "scene.json has 16 problems" in text
 
 
 @pytest.mark.parametrize(
@@ -242,6 +249,8 @@ def test_all_problems_are_listed_at_once(ball_file: Path):
         ("component", -1, "whole number from 0"),
         ("byte_order", "middle", "'little' or 'big'"),
         ("frames", True, "whole number"),
+        ("crop_flags", "fence", "give crop, too"),
+        ("cut", 5, "expected a list"),
         ("volume", "missing.nrrd", "there is no file or folder"),
     ],
 )

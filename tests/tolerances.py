@@ -44,9 +44,10 @@ COMPOSITE_TWIN = 3e-4
 # and, rarely, the neighbouring table entry, as above.
 FLOAT32_IMAGE = 3e-4
 
-# A border between two parts, c from a sample's slice, moves the look-up of the piece beyond it, ½ − c long, by
-# up to c: c·(½ − c) ≤ 1/16. The test's extinction varies by up to 0.14 a voxel, a ray is up to 1.7 an interval:
-# 0.14 · 1.7 / 16 = 0.015, were all at its worst in one ray; half the slope, slant and transparency leave a third.
+# A border between two parts, c from a sample's slice, moves the look-up of the piece beyond it, ½ − c long,
+# by up to c: c·(½ − c) ≤ 1/16. The test's extinction varies by up to 0.14 a voxel, a ray is up to 1.7 an
+# interval: 0.14 · 1.7 / 16 = 0.015, were all at its worst in one ray; a third of it for slope, slant and
+# transparency that are not.
 BORDER_SMOOTH = 0.005
 
 # --- Geometry and warp ------------------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -117,8 +118,8 @@ def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
     keys = {name: value for name, value in given.items() if value is not None and value != ()}
     if "cut" in keys:
         keys["cut"] = [{"plane": cut[:4], "thickness": cut[4], "show": cut[5]} for cut in keys["cut"]]
-    if keys.get("crop_flags", "")[:1].isdecimal():
-        keys["crop_flags"] = _whole(keys["crop_flags"])
+    with suppress(KeyError, ValueError):  # a name stays one
+        keys["crop_flags"] = int(keys["crop_flags"], 0)
     for name in ("component", "series"):
         if str(keys.get(name, "")).isdecimal():
             keys[name] = int(keys[name])
@@ -127,13 +128,6 @@ def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
     if Path(path).suffix.lower() in (".json", ".toml"):
         return Scene.load(path, progress=progress, **keys)
     return Scene.of_file(path, progress=progress, **keys)
-
-
-def _whole(text: str) -> int:
-    try:
-        return int(text, 0)  # 0x… and 0b… too
-    except ValueError:
-        raise click.BadParameter(f"{text!r} is no whole number", param_hint="--crop-flags") from None
 
 
 def say_missing_voxels(volume: Volume) -> None:
