@@ -62,11 +62,16 @@ def vtk_volume(scene, mapper):
     mapper.SetInputData(image)
     mapper.SetBlendModeToComposite()
     if scene.regions.crop is not None:
-        low, high = scene.regions.box(volume)
-        mapper.SetCroppingRegionPlanes(*(np.array([low, high]) * volume.spacing).T.ravel())
-        mapper.SetCroppingRegionFlagsToSubVolume()
+        mapper.SetCroppingRegionPlanes(*np.array(scene.regions.crop) * np.repeat(volume.spacing, 2))
+        mapper.SetCroppingRegionFlags(scene.regions.crop_flags)
         mapper.CroppingOn()
-    for plane in scene.regions.clip:
+    planes = list(scene.regions.clip)
+    for cut in scene.regions.cut:
+        if cut.show == "outside":
+            raise SystemExit(f"{scene.name}: VTK cannot leave out a slab")
+        plane, reach = np.array(cut.plane), cut.thickness / 2 * np.linalg.norm(cut.plane[:3])
+        planes += [plane + (0, 0, 0, reach), (0, 0, 0, reach) - plane]
+    for plane in planes:
         normal = np.array(plane[:3])
         clip = vtkPlane()
         clip.SetNormal(*normal)

@@ -7,7 +7,7 @@ import pytest
 from tolerances import BORDER_SMOOTH, CLOSED_FORM, FLOAT32_IMAGE, ROUNDING
 from views import DIRECTIONS, direction, face_view, random_pose, view_of
 
-from persp_sw import Cut, Regions, Renderer, Settings, TransferFunction, Volume, reference
+from persp_sw import Cut, Regions, Renderer, Settings, TransferFunction, View, Volume, reference
 from persp_sw.errors import ViewError
 from persp_sw.geometry.parts import shown_parts
 from persp_sw.geometry.regions import ALL_REGIONS, CROP_FLAGS
@@ -194,6 +194,15 @@ def test_a_parts_box_is_as_small_as_can_be():
             assert np.abs(points.max(0) - part.high).max() < 1e-6
             tested += 1
     assert tested > 60
+
+
+def test_planes_through_corners_and_edges():
+    """A wedge by a plane through two edges, cut through its slanted side: 0 ≤ y ≤ x ≤ 4 − y."""
+    volume = box_of(size=(5, 5, 5)).volume
+    (part,) = shown_parts(Regions(clip=[(1, -1, 0, 0), (-1, -1, 0, 4)]), volume, EYE)
+    assert (part.low == 0).all()
+    np.testing.assert_allclose(part.high, (4, 2, 4))
+    assert shown_parts(Regions(clip=[(1, -1, 0, 0), (-1, 1, 0, 0)]), volume, EYE) == []
 
 
 def interval(part, origin, towards):
@@ -386,6 +395,17 @@ def test_the_reference_shows_regions_as_the_crops_of_each():
         picture = reference.render(slab.volume, slab.transfer, view, regions=Regions(CROP, crop_flags=flags))
         alpha = -np.expm1(-slab.transfer.extinction(100.0) * length)
         assert np.abs(picture[..., 3] - alpha).max() < ROUNDING
+
+
+def test_a_ray_in_a_border_sees_what_has_a_thickness():
+    slab = box_of(size=(3, 3, 3))
+    view = View.look_at((2, 1, -8), (2, 1, 1), (0, 1, 0), 10, (1, 1))  # in the side x = 2
+    whole, side, nothing = (
+        reference.render(slab.volume, slab.transfer, view, regions=regions)[0, 0, 3]
+        for regions in (Regions(), Regions((1, 2, 0, 2, 0, 2)), Regions(cut=[Cut((1, 0, 0, -2), 0)]))
+    )
+    assert whole == side > 0.1
+    assert nothing == 0
 
 
 def test_inside_and_outside_of_a_slab_are_the_whole():
