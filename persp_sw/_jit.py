@@ -69,6 +69,7 @@ from numba.extending import intrinsic  # noqa: E402
 
 __all__ = [
     "VECTORS",
+    "allocating_kernel",
     "compile_seconds",
     "inlined_kernel",
     "intrinsic",
@@ -88,6 +89,7 @@ _OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract"}, "error_model
 
 # Without `_nrt`, an array's references are counted, atomically, at every call: 10 ns each.
 kernel = numba.njit(_nrt=False, **_OPTIONS)
+allocating_kernel = numba.njit(**_OPTIONS)  # returns new arrays
 parallel_kernel = numba.njit(parallel=True, **_OPTIONS)
 # An array is passed as eight numbers: a call with ten of them for every packet took longer than the packet.
 inlined_kernel = numba.njit(_nrt=False, forceinline=True, **_OPTIONS)

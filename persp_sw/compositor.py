@@ -15,8 +15,9 @@ from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.parts import Part, shown_parts
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
-from .kernels.composite import Store, Table
+from .kernels.composite import Table
 from .kernels.composite import composite as composite_face
+from .kernels.scanline import Level
 from .optics.classification import Classification
 from .settings import Settings
 from .volume.levels import STANDARD_AXES
@@ -69,13 +70,8 @@ def composite_eye(
         width, height = face.size
         out = pixels[start : start + width * height].reshape(height, width, 4)
         start += width * height
-        for number, part in enumerate(parts):
-            pixels_of_part = out if number == 0 else np.empty_like(out)
-            samples += _composite(
-                store, classification, part, settings, eye, eye_object, face, threads, pixels_of_part
-            )
-            if number > 0:
-                _put_behind(out, pixels_of_part)
+        for part in parts:
+            samples += _composite(store, classification, part, settings, eye, eye_object, face, threads, out)
     return EyeImage(eye, pose, tuple(faces), pixels, samples)
 
 
@@ -91,11 +87,6 @@ def _seen_parts(
         low = np.min([np.maximum(part.low, low) for part in parts], axis=0)
         high = np.max([np.minimum(part.high, high) for part in parts], axis=0)
     return parts, low, high
-
-
-def _put_behind(front: Image, back: Image) -> None:
-    """`front` becomes front OVER back, premultiplied."""
-    front += (1 - front[..., 3:]) * back
 
 
 def _enough_samples(classification: Classification, linear: NDArray[np.float64]) -> int:
@@ -133,14 +124,24 @@ def _composite(
     half_spaces = part.half_spaces[:, [*axes, 3]]
     samples = np.zeros(out.shape[0], np.int64)
     _jit.set_threads(threads)
+    level = Level(
+        runs.visible,
+        runs.pairs,
+        runs.needed,
+        runs.offsets,
+        runs.voxels,
+        np.ones(3),
+        np.column_stack([low, high]).ravel(),
+        runs.size[2],
+    )
     composite_face(
         geometry,
         linear.T @ linear,
-        np.column_stack([low, high]).ravel(),
         np.ascontiguousarray(half_spaces),
-        runs.size[2],
+        np.array([np.inf, np.inf]),
         per_interval,
-        Store(runs.visible, runs.pairs, runs.needed, runs.offsets, runs.voxels),
+        level,
+        level,
         Table(classification.table, np.float32(classification.origin), np.float32(classification.scale)),
         np.float32(settings.residual),
         threads,

@@ -20,16 +20,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import VECTORS, inlined_kernel, kernel, parallel_kernel, prange, trailing_zeros
+from .._jit import VECTORS, allocating_kernel, inlined_kernel, kernel, parallel_kernel, prange, trailing_zeros
 from .encode import BLOCK, packed_position
 from .packet_portable import SCRATCH, WINDOW
 from .scanline import (
     BASE,
-    CHUNK,
     CORNER,
     DISTANCE,
     EYE_K,
+    HIGH,
+    INTERVAL,
     LEAST,
+    LEVEL,
+    LOW,
     NEAR,
     NUMBER,
     OFFSET_I,
@@ -38,9 +41,9 @@ from .scanline import (
     ORIGIN_I,
     ORIGIN_J,
     PITCH,
-    PLANE_ROWS,
     ROW,
     ROW_WEIGHT,
+    SHARE,
     SIGN,
     SLICE,
     SLICE_WEIGHT,
@@ -48,6 +51,7 @@ from .scanline import (
     STEP,
     collect_planes,
     find_hits,
+    new_chunk,
     plane_range,
     window,
 )
@@ -62,16 +66,6 @@ _F = np.float32
 _NONE, _ONE, _BLOCK = np.uint64(0), np.uint64(1), np.uint64(BLOCK)
 
 
-class Store(NamedTuple):
-    """The runs of one principal axis; see `volume.runs.AxisRuns`."""
-
-    visible: np.ndarray
-    pairs: np.ndarray
-    needed: np.ndarray
-    offsets: np.ndarray
-    voxels: np.ndarray
-
-
 class Table(NamedTuple):
     """A transfer function; see `optics.classification.Classification`."""
 
@@ -80,7 +74,37 @@ class Table(NamedTuple):
     scale: np.float32
 
 
+class Tiles(NamedTuple):
+    """A scanline's tiles: what they have accumulated, and room to work.
+
+    states [tile]; strides [tile]: a tile takes the planes whose number has none of these bits; reach [tile,
+    2]: nearest and farthest distance of any of its pixels; lanes: `SECTIONS` of 16 floats a tile; ranges,
+    scratch, cells: of the tile at work.
+    """
+
+    states: np.ndarray
+    strides: np.ndarray
+    reach: np.ndarray
+    lanes: np.ndarray
+    ranges: np.ndarray
+    scratch: np.ndarray
+    cells: np.ndarray
+
+
 _FRESH, _GOING, _DONE = 0, 1, 2  # states of a tile
+
+
+@allocating_kernel
+def _new_tiles(number):
+    return Tiles(
+        np.empty(number, np.int64),
+        np.empty(number, np.int64),
+        np.empty((number, 2), np.float64),
+        np.empty(number * TILE * SECTIONS, np.float32),
+        np.empty(3 * TILE, np.float64),
+        np.empty(SCRATCH, np.float32),
+        np.empty(TILE, np.int32),
+    )
 
 
 @kernel
@@ -119,12 +143,13 @@ def _find_ranges(n, first, t_j, offset_j, face, metric, half_spaces, ranges):
 
 
 @kernel
-def _start_tile(n, v, pixel, base, residual, ranges, out, lanes, at):
-    """Take up the tile's pixels and note their ranges; returns the nearest and farthest distance of all.
+def _start_tile(n, v, pixel, base, residual, out, tiles, reach, at):
+    """Take up the tile's pixels and note their ranges; `reach`: nearest and farthest of all.
 
     `out` holds what lies in front of them. Rays that show nothing or are opaque ask for no more.
     """
-    nearest, farthest = np.inf, -np.inf
+    ranges, lanes = tiles.ranges, tiles.lanes
+    reach[0], reach[1] = np.inf, -np.inf
     for lane in range(n):
         l = np.uint64(lane)  # noqa: E741
         lane_at = np.uint64(at) + l
@@ -133,35 +158,34 @@ def _start_tile(n, v, pixel, base, residual, ranges, out, lanes, at):
             lanes[np.uint64(TILE * channel) + lane_at] = out[v, pixel + lane, channel]
         lanes[LENGTH + lane_at] = _F(ranges[np.uint64(2 * n) + l])
         if near < far and lanes[ALPHA + lane_at] < 1.0 - residual:
-            nearest, farthest = min(nearest, near), max(farthest, far)
+            reach[0], reach[1] = min(reach[0], near), max(reach[1], far)
             lanes[RAY_NEAR + lane_at] = _F(near - base)
             lanes[RAY_FAR + lane_at] = _F(far - base)
             lanes[ENOUGH + lane_at] = _F(1.0 - residual)
         else:
             lanes[RAY_NEAR + lane_at] = lanes[RAY_FAR + lane_at] = _F(0.0)
             lanes[ENOUGH + lane_at] = _F(-1.0)
-    return nearest, farthest
 
 
 @inlined_kernel
-def _composite_packet(
-    n, p, pixel, near, far, box, planes, masks, store, table, scratch, cells,
-    lanes, at,
-):  # fmt: skip
+def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
     """A tile on plane p, which stands for [near, far]; returns samples taken and whether all is opaque."""
-    last_cell = np.ceil(box[1]) - 1.0
+    planes, lanes, cells, scratch = chunk.planes, tiles.lanes, tiles.cells, tiles.scratch
+    low, high = planes[LOW, p], planes[HIGH, p]
+    last_cell = np.ceil(high) - 1.0
     step = planes[STEP, p]
     x_first = planes[CORNER, p] + (pixel + 0.5) * step
     x_last = x_first + (n - 1) * step
-    start = np.floor(min(max(x_first, box[0]), last_cell))
+    start = np.floor(min(max(x_first, low), last_cell))
     first = np.uint64(np.int64(start))
-    end = np.uint64(np.int64(min(max(x_last, box[0]), last_cell))) + _ONE
+    end = np.uint64(np.int64(min(max(x_last, low), last_cell))) + _ONE
     j, k = np.uint64(planes[ROW, p]), np.uint64(planes[SLICE, p])
     weight_j, weight_k = _F(planes[ROW_WEIGHT, p]), _F(planes[SLICE_WEIGHT, p])
+    share = _F(planes[SHARE, p])
     samples = 0
     block = first // _BLOCK
     while block * _BLOCK < end:
-        bits = window(masks, p, block)
+        bits = window(chunk.masks, p, block)
         if bits == _NONE:
             block += np.uint64(64)
             continue
@@ -171,20 +195,20 @@ def _composite_packet(
         begin, stop = max(block * _BLOCK, first), min(until * _BLOCK, end)
         while begin < stop:
             window_end = min(stop, begin + np.uint64(WINDOW - 1))
-            at_00 = packed_position(store.needed, store.offsets, j, k, begin)
-            at_10 = packed_position(store.needed, store.offsets, j + _ONE, k, begin)
+            at_00 = packed_position(level.needed, level.offsets, j, k, begin)
+            at_10 = packed_position(level.needed, level.offsets, j + _ONE, k, begin)
             at_01, at_11 = at_00, at_10
             if weight_k != _F(0.0):
-                at_01 = packed_position(store.needed, store.offsets, j, k + _ONE, begin)
-                at_11 = packed_position(store.needed, store.offsets, j + _ONE, k + _ONE, begin)
+                at_01 = packed_position(level.needed, level.offsets, j, k + _ONE, begin)
+                at_11 = packed_position(level.needed, level.offsets, j + _ONE, k + _ONE, begin)
             sample(
-                n, np.int64(window_end - begin) + 1, store.voxels, at_00, at_10, at_01, at_11, weight_j, weight_k,
-                _F(x_first - start), _F(step), _F(box[0] - start), _F(box[1] - start), _F(last_cell - start),
-                _F(begin - first), _F(window_end - first), scratch, cells, lanes, at,
+                n, np.int64(window_end - begin) + 1, level.voxels, at_00, at_10, at_01, at_11, weight_j,
+                weight_k, _F(x_first - start), _F(step), _F(low - start), _F(high - start),
+                _F(last_cell - start), _F(begin - first), _F(window_end - first), scratch, cells, lanes, at,
             )  # fmt: skip
             samples += n
             begin = window_end
-            if blend(n, table.rows, table.origin, table.scale, near, far, scratch, cells, lanes, at):
+            if blend(n, table.rows, table.origin, table.scale, share, near, far, scratch, cells, lanes, at):
                 return samples, True
         block = until
     return samples, False
@@ -192,13 +216,17 @@ def _composite_packet(
 
 @kernel
 def _composite_tile(
-    n, pixel, per_interval, stride_mask, nearest, farthest, base, box, planes, masks, hits, count, store, table, scratch, cells, lanes, at,
-):  # fmt: skip
-    """A tile through the planes of a chunk that it hits; returns samples taken and whether it is done."""
+    n, pixel, per_interval, stride_mask, reach, base, chunk, count, fine, coarse, table, tiles, at
+):
+    """A tile through the planes of a chunk that it hits; returns samples taken and whether it is done.
+
+    `reach`: the nearest and the farthest distance that any of its pixels shows.
+    """
+    planes, nearest, farthest = chunk.planes, reach[0], reach[1]
     stride = stride_mask + 1
     samples = 0
     for group in range((count + 7) // 8):
-        flags = hits[np.uint64(group)]
+        flags = chunk.hits[np.uint64(group)]
         while flags:
             p = np.uint64(8 * group) + (trailing_zeros(flags) >> np.uint64(3))
             flags &= flags - _ONE
@@ -207,13 +235,19 @@ def _composite_tile(
             if stride < per_interval:
                 on_even = np.int64(planes[NUMBER, p]) & stride == 0
                 half = (1.0 if on_even else 2.0) * stride / (3.0 * per_interval)
+            half *= planes[INTERVAL, p]
             if distance - half >= farthest:
+                # Nothing of a finer level follows; a coarse plane reaches as far back as two fine ones.
+                if planes[LEVEL, p] == 0.0:
+                    continue
                 return samples, True
             if distance + half <= nearest:
                 continue
-            taken, done = _composite_packet(
-                n, p, pixel, _F(distance - half - base), _F(distance + half - base), box, planes, masks, store, table, scratch, cells, lanes, at,
-            )  # fmt: skip
+            near, far = _F(distance - half - base), _F(distance + half - base)
+            if planes[LEVEL, p] == 0.0:
+                taken, done = _composite_packet(n, p, pixel, near, far, chunk, fine, table, tiles, at)
+            else:
+                taken, done = _composite_packet(n, p, pixel, near, far, chunk, coarse, table, tiles, at)
             samples += taken
             if done:
                 return samples, True
@@ -222,51 +256,49 @@ def _composite_tile(
 
 @kernel
 def _composite_row(
-    v, face, metric, box, half_spaces, size_k, per_interval, store, table, residual, planes, masks, states, strides, hits, ranges, depths, scratch, cells, lanes, out,
-):  # fmt: skip
+    v, face, metric, half_spaces, zone, per_interval, fine, coarse, table, residual, chunk, tiles, out
+):
     """One scanline of the face; returns the number of samples taken."""
+    queue, states, strides = chunk.queue, tiles.states, tiles.strides
     t_j = face[ORIGIN_J] + (v + 0.5) * face[PITCH]
     offset_j = face[OFFSET_J] + (v + 0.5) * face[OFFSET_PITCH]
-    n = cells.shape[0]  # TILE, unknown to the compiler: a known 16 is unrolled before it can be vectorised
-    tiles = states.shape[0]
-    flags = hits.view(np.uint8)
+    n = tiles.cells.shape[
+        0
+    ]  # TILE, unknown to the compiler: a known 16 is unrolled before it can be vectorised
+    number = states.shape[0]
     # Pixels whose range begins or ends within half an interval read the nearest voxel of the box.
-    beyond = 0.5 * max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + tiles * TILE * face[PITCH])) + 0.01
-    for tile in range(tiles):
+    beyond = 0.5 * max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + number * TILE * face[PITCH])) + 0.01
+    for tile in range(number):
         states[tile] = _FRESH
         t_left = face[ORIGIN_I] + tile * TILE * face[PITCH]
         steepest = max(max(abs(t_left), abs(t_left + TILE * face[PITCH])), abs(t_j))
         wanted = 4 if steepest > 2.0 * STEEP else 2 if steepest > STEEP else 1
         strides[tile] = per_interval // min(max(wanted, np.int64(face[LEAST])), per_interval) - 1
-    first_live, end_live = 0, tiles
-    first_plane, end_plane = plane_range(t_j, offset_j, face, size_k, per_interval, box)
+    queue[0], queue[1] = plane_range(t_j, offset_j, face, 0.0, zone[1], per_interval, fine)
+    queue[2], queue[3] = plane_range(t_j, offset_j, face, zone[0], np.inf, per_interval, coarse)
+    first_live, end_live = 0, number
     samples = 0
-    for first in range(first_plane, end_plane, CHUNK):
-        count = collect_planes(
-            first, min(first + CHUNK, end_plane), t_j, offset_j, face, size_k, per_interval, box, store.visible,
-            store.pairs, planes, masks,
-        )  # fmt: skip
+    while first_live < end_live:
+        count = collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
         if count == 0:
-            continue
+            break
         for tile in range(first_live, end_live):
             if states[tile] == _DONE:
                 continue
             pixel, at = tile * TILE, tile * TILE * SECTIONS
-            find_hits(pixel, count, strides[tile], box, beyond, planes, masks, flags)
+            find_hits(pixel, count, strides[tile], beyond, chunk)
             if states[tile] == _FRESH:
                 hit = _NONE
                 for group in range((count + 7) // 8):
-                    hit |= hits[np.uint64(group)]
+                    hit |= chunk.hits[np.uint64(group)]
                 if hit == _NONE:
                     continue
                 states[tile] = _GOING
-                _find_ranges(n, pixel, t_j, offset_j, face, metric, half_spaces, ranges)
-                depths[tile, 0], depths[tile, 1] = _start_tile(
-                    n, v, pixel, face[BASE], residual, ranges, out, lanes, at
-                )
+                _find_ranges(n, pixel, t_j, offset_j, face, metric, half_spaces, tiles.ranges)
+                _start_tile(n, v, pixel, face[BASE], residual, out, tiles, tiles.reach[tile], at)
             taken, done = _composite_tile(
-                n, pixel, per_interval, strides[tile], depths[tile, 0], depths[tile, 1], face[BASE], box, planes,
-                masks, hits, count, store, table, scratch, cells, lanes, at,
+                n, pixel, per_interval, strides[tile], tiles.reach[tile], face[BASE], chunk, count, fine,
+                coarse, table, tiles, at,
             )  # fmt: skip
             samples += taken
             if done:
@@ -275,20 +307,19 @@ def _composite_row(
             first_live += 1
         while first_live < end_live and states[end_live - 1] == _DONE:
             end_live -= 1
-        if first_live == end_live:
-            break
-    for tile in range(tiles):
+    for tile in range(number):
         if states[tile] != _FRESH:
+            at = tile * TILE * SECTIONS
             for l in range(TILE):  # noqa: E741
                 for channel in range(4):
-                    out[v, tile * TILE + l, channel] = lanes[tile * TILE * SECTIONS + TILE * channel + l]
+                    out[v, tile * TILE + l, channel] = tiles.lanes[at + TILE * channel + l]
     return samples
 
 
 @parallel_kernel
 def composite(
-    face, metric, box, half_spaces, size_k, per_interval, store, table, residual, workers, samples, out,
-):  # fmt: skip
+    face, metric, half_spaces, zone, per_interval, fine, coarse, table, residual, workers, samples, out
+):
     """Composite one face of an eye image behind what `out` already holds.
 
     Parameters
@@ -301,18 +332,17 @@ def composite(
         samples in an interval (1, 2 or 4); and the world distance before which nothing is shown.
     metric
         float64 (3, 3), AᵀA of the linear part A of world_from_standard.
-    box
-        float64 [i0, i1, j0, j1, k0, k1] of the shown voxel centres; look-ups along i and j are clamped to it.
     half_spaces
         float64 (n, 4): shown where a·(i, j, k) + a_0 ≥ 0; the box's six included.
-    size_k
-        Number of slices.
+    zone
+        float64 (2,): the fine level serves up to distance zone[0], the coarse one from zone[1] on; between
+        them both, each with its share of the extinction. Both infinite: no coarse level.
     per_interval
         Sample planes a slice interval at the steepest tile: 1, 2 or 4. More than 1 needs `pairs`.
-    store
-        Arrays of `volume.runs.AxisRuns`.
+    fine, coarse
+        `scanline.Level`.
     table
-        Of `optics.classification.Classification`; origin and scale float32.
+        Transfer function.
     residual
         A packet stops when all its pixels let through no more than this.
     workers
@@ -320,22 +350,26 @@ def composite(
     samples
         int64 (height,): overwritten with the samples taken in each scanline.
     out
-        float32 (height, width, 4), width a multiple of 16: linear, premultiplied; what lies in front, added to.
+        float32 (height, width, 4), width a multiple of 16: linear, premultiplied; what lies in front, and
+        what is composited behind it.
     """
     for worker in prange(workers):
-        tiles = out.shape[1] // TILE
-        planes = np.empty((PLANE_ROWS, CHUNK), np.float64)
-        masks = np.zeros((CHUNK, store.visible.shape[2] + 1), np.uint64)
-        states = np.empty(tiles, np.int64)
-        strides = np.empty(tiles, np.int64)
-        hits = np.zeros(CHUNK // 8, np.uint64)
-        ranges = np.empty(3 * TILE, np.float64)
-        depths = np.empty((tiles, 2), np.float64)
-        scratch = np.empty(SCRATCH, np.float32)
-        cells = np.empty(TILE, np.int32)
-        lanes = np.empty(tiles * TILE * SECTIONS, np.float32)
+        words = max(fine.visible.shape[2], coarse.visible.shape[2])
+        chunk = new_chunk(words)
+        tiles = _new_tiles(out.shape[1] // TILE)
         for v in range(worker, out.shape[0], workers):
             samples[v] = _composite_row(
-                v, face, metric, box, half_spaces, size_k, per_interval, store, table, residual, planes, masks, states, strides, hits, ranges, depths, scratch, cells,
-                lanes, out,
-            )  # fmt: skip
+                v,
+                face,
+                metric,
+                half_spaces,
+                zone,
+                per_interval,
+                fine,
+                coarse,
+                table,
+                residual,
+                chunk,
+                tiles,
+                out,
+            )

@@ -2,8 +2,8 @@
 
 These two functions are all that is worth writing for one kind of processor; `packet_vector` does. The loops
 over lanes become vectors where the compiler can. Their length `n` is always 16, but must not be known to the
-compiler: a known 16 is unrolled before it can be vectorised (blending: 22 instead of 12 ns a packet). Integers
-stay out of the vector loops, for numba widens them to 64 bits and the vectors get half as long.
+compiler: a known 16 is unrolled before it can be vectorised (blending: 22 instead of 12 ns a packet).
+Integers stay out of the vector loops, for numba widens them to 64 bits and the vectors get half as long.
 """
 
 import numpy as np
@@ -76,13 +76,14 @@ def sample(
 
 
 @inlined_kernel
-def blend(n, table, origin, scale, near, far, scratch, cells, lanes, at):
+def blend(n, table, origin, scale, share, near, far, scratch, cells, lanes, at):
     """Classify the samples and lay them under what is there; they stand for [near, far] of each ray.
 
-    `near`, `far` count from `base`, as the rays' ranges do. True if no pixel lets enough light through to go
-    on.
+    `near`, `far` count from `base`, as the rays' ranges do; `share` scales the extinction. True if no pixel
+    lets enough light through to go on.
     """
     pixel = np.uint64(at)
+    part = share * MINUS_LOG2E
     last = _F(table.shape[0] - 1)
     for l in range(np.uint64(n)):  # noqa: E741
         value = lanes[pixel + VALUE + l]
@@ -106,7 +107,7 @@ def blend(n, table, origin, scale, near, far, scratch, cells, lanes, at):
         end = end if end < far else far
         length = end - begin
         length = length if length > _F(0.0) else _F(0.0)
-        y = scratch[extinctions + l] * (lanes[pixel + LENGTH + l] * length) * MINUS_LOG2E
+        y = scratch[extinctions + l] * (lanes[pixel + LENGTH + l] * length) * part
         y = y if y > _F(-126.0) else _F(-126.0)
         shifted = y + ROUNDER
         f = y - (shifted - ROUNDER)

@@ -126,11 +126,11 @@ def sample(
 
 
 @intrinsic
-def _blend(_context, table, origin, scale, last, near, far, lanes, at):
+def _blend(_context, table, origin, scale, last, share, near, far, lanes, at):
     def build(context, builder, signature, arguments):
         entries = _pointer(context, builder, signature.args[0], arguments[0])
-        origin, scale, last, near, far = (simd.everywhere(builder, scalar) for scalar in arguments[1:6])
-        state, at = _pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
+        origin, scale, last, part, near, far = (simd.everywhere(builder, scalar) for scalar in arguments[1:7])
+        state, at = _pointer(context, builder, signature.args[7], arguments[7]), arguments[8]
 
         def read(section):
             return simd.load(builder, state, _section(builder, at, section))
@@ -140,7 +140,7 @@ def _blend(_context, table, origin, scale, last, near, far, lanes, at):
         entry = simd.where(value.is_number(), entry, 0.0)
         red, green, blue, extinction = simd.look_up(builder, entries, entry.to_integers())
         length = (read(RAY_FAR).at_most(far) - read(RAY_NEAR).at_least(near)).at_least(0.0)
-        y = (extinction * (read(LENGTH) * length) * float(MINUS_LOG2E)).at_least(-126.0)
+        y = (extinction * (read(LENGTH) * length) * part).at_least(-126.0)
         shifted = y + float(ROUNDER)
         f = y - (shifted - float(ROUNDER))
         *others, q = (float(c) for c in EXP2_COEFFICIENTS)
@@ -156,11 +156,12 @@ def _blend(_context, table, origin, scale, last, near, far, lanes, at):
         simd.store(builder, accumulated, state, _section(builder, at, ALPHA))
         return simd.none(builder, accumulated < read(ENOUGH))
 
-    arguments = (table, *[types.float32] * 5, lanes, types.int64)
+    arguments = (table, *[types.float32] * 6, lanes, types.int64)
     return types.boolean(*arguments), build
 
 
 @inlined_kernel
-def blend(n, table, origin, scale, near, far, scratch, cells, lanes, at):
+def blend(n, table, origin, scale, share, near, far, scratch, cells, lanes, at):
     """See `packet_portable.blend`."""
-    return _blend(table, origin, scale, np.float32(table.shape[0] - 1), near, far, lanes, at)
+    last = np.float32(table.shape[0] - 1)
+    return _blend(table, origin, scale, last, share * MINUS_LOG2E, near, far, lanes, at)

@@ -1,12 +1,14 @@
-"""What one scanline of a face meets: the sample planes with something visible, and which of them a tile needs.
+"""What one scanline of a face meets: sample planes with something visible, and which of them a tile needs.
 
 Planes are taken `CHUNK` at a time. A tile finds its planes by comparing bits: the blocks under its pixels
 with the plane's mask of visible blocks. (Projecting every run to its tiles instead took 25 ns a run.)
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from .._jit import inlined_kernel, kernel
+from .._jit import allocating_kernel, inlined_kernel, kernel
 from .encode import WORD
 from .state import TILE
 
@@ -16,75 +18,166 @@ CHUNK = 64  # sample planes looked at together; a multiple of 8
 # `face`, see `composite.composite`.
 (OFFSET_I, OFFSET_J, OFFSET_PITCH, ORIGIN_I, ORIGIN_J, PITCH, EYE_K, SIGN, BASE, LEAST, NEAR) = range(11)
 
-# Rows of `planes`, one column for each sample plane of the chunk that is not empty: its number, counted front
-# to back; its distance; scanline and slice before it and the weights of those behind; i of the image's corner
-# and how far apart pixels are along i.
-NUMBER, DISTANCE, ROW, ROW_WEIGHT, SLICE, SLICE_WEIGHT, CORNER, STEP = range(8)
-PLANE_ROWS = 8
+# Rows of `planes`, one column for each sample plane of the chunk that is not empty: its number in its level,
+# counted front to back; its distance; in the level's voxels, the scanline and slice before it and the weights
+# of those behind, i of the image's corner, how far apart pixels are along i, and the part of the box along i;
+# how many voxels of the volume one slice interval of the level is; 0 for the fine level, 1 for the coarse;
+# the share of the extinction that it stands for.
+(
+    NUMBER, DISTANCE, ROW, ROW_WEIGHT, SLICE, SLICE_WEIGHT, CORNER, STEP, LOW, HIGH, INTERVAL, LEVEL, SHARE,
+) = range(13)  # fmt: skip
+PLANE_ROWS = 13
 
 _ONE = np.uint64(1)
 _BITS = np.uint64(WORD - 1)
 _EIGHT = np.uint64(8)
 
 
+class Level(NamedTuple):
+    """The runs of one principal axis of one level of detail.
+
+    visible, pairs, needed, offsets, voxels: see `volume.runs.AxisRuns`. factor: float64 (3,), voxels of the
+    volume that one voxel of the level is, along i, j and k. box: float64 [i0, i1, j0, j1, k0, k1], the shown
+    part in the level's voxels; look-ups along i and j are clamped to it. slices: how many.
+    """
+
+    visible: np.ndarray
+    pairs: np.ndarray
+    needed: np.ndarray
+    offsets: np.ndarray
+    voxels: np.ndarray
+    factor: np.ndarray
+    box: np.ndarray
+    slices: np.int64
+
+
+class Chunk(NamedTuple):
+    """Sample planes of a scanline that are looked at together.
+
+    queue: int64 [next fine plane, end, next coarse plane, end]. planes: float64 [PLANE_ROWS, CHUNK]. masks:
+    uint64 [CHUNK, words + 1], the visible blocks of each plane's scanline, then zeros. hits: uint64, a byte
+    for each plane, 1 where the tile at work may meet it; flags: the same bytes.
+    """
+
+    queue: np.ndarray
+    planes: np.ndarray
+    masks: np.ndarray
+    hits: np.ndarray
+    flags: np.ndarray
+
+
+@allocating_kernel
+def new_chunk(words):
+    """Room for a chunk of scanlines of so many words of blocks."""
+    hits = np.zeros(CHUNK // 8, np.uint64)
+    planes, masks = np.empty((PLANE_ROWS, CHUNK), np.float64), np.empty((CHUNK, words + 1), np.uint64)
+    return Chunk(np.empty(4, np.int64), planes, masks, hits, hits.view(np.uint8))
+
+
 @kernel
-def plane_range(t_j, offset_j, face, size_k, per_interval, box):
-    """First sample plane that scanline t_j may need, counted front to back, and the one after its last."""
-    low_j, high_j, low_k, high_k = box[2], box[3], box[4], box[5]
+def plane_range(t_j, offset_j, face, near, far, per_interval, level):
+    """First sample plane of a level that scanline t_j may need, front to back, and the one after the last.
+
+    near, far: the distances at which the level is wanted.
+    """
+    low_j, high_j = level.box[2] * level.factor[1], level.box[3] * level.factor[1]
+    interval = level.factor[2]
     sign, e_k = face[SIGN], face[EYE_K]
     # The distances at which the scanline's sheet is in the box, as far as j and k tell.
-    near, far = 0.0, np.inf
     if t_j != 0.0:
         one, other = (low_j - offset_j) / t_j, (high_j - offset_j) / t_j
         near, far = max(near, min(one, other)), min(far, max(one, other))
     elif offset_j < low_j or offset_j > high_j:
         return 0, 0
-    one, other = sign * (low_k - e_k), sign * (high_k - e_k)
+    one, other = sign * (level.box[4] * interval - e_k), sign * (level.box[5] * interval - e_k)
     near, far = max(near, min(one, other)), min(far, max(one, other))
     if near > far:
         return 0, 0
-    base = sign * ((0.0 if sign > 0 else size_k - 1.0) - e_k)
-    first = max(np.int64(np.ceil((near - 0.5 - base) * per_interval)), 0)
-    last = min(np.int64(np.floor((far + 0.5 - base) * per_interval)), (size_k - 1) * per_interval)
+    base = sign * ((0.0 if sign > 0 else (level.slices - 1.0) * interval) - e_k)
+    first = max(np.int64(np.ceil(((near - base) / interval - 0.5) * per_interval)), 0)
+    last = min(
+        np.int64(np.floor(((far - base) / interval + 0.5) * per_interval)), (level.slices - 1) * per_interval
+    )
     return first, last + 1
 
 
-@kernel
-def collect_planes(first, end, t_j, offset_j, face, size_k, per_interval, box, visible, pairs, planes, masks):
-    """Fill `planes` and `masks` with sample planes first … end − 1, empty ones left out; returns their number.
+@inlined_kernel
+def _plane_distance(q, face, per_interval, level):
+    """Distance and slice coordinate, in the level's voxels, of a level's sample plane q."""
+    first_k = 0.0 if face[SIGN] > 0 else level.slices - 1.0
+    k = first_k + face[SIGN] * (q / np.float64(per_interval))
+    return face[SIGN] * (k * level.factor[2] - face[EYE_K]), k
 
-    `masks` uint64 [CHUNK, words + 1]: the visible blocks of the plane's scanline, then a word of zeros.
+
+@inlined_kernel
+def _place_plane(p, q, number, share, t_j, offset_j, face, per_interval, level, chunk):
+    """Note sample plane q of a level in column p; returns whether anything in its scanline is visible."""
+    planes, masks = chunk.planes, chunk.masks
+    distance, k = _plane_distance(q, face, per_interval, level)
+    ahead = max(distance, 0.0)
+    j = min(max((offset_j + t_j * ahead) / level.factor[1], level.box[2]), level.box[3])
+    row, slice_ = min(np.floor(j), np.ceil(level.box[3]) - 1.0), np.floor(k)
+    at_j, at_k = np.uint64(np.int64(row)), np.uint64(np.int64(slice_))
+    words = np.uint64(level.visible.shape[2])
+    seen = np.uint64(0)
+    for w in range(words):
+        mask = level.pairs[at_j, at_k, w] if k != slice_ else level.visible[at_j, at_k, w]
+        masks[p, w] = mask
+        seen |= mask
+    for w in range(words, np.uint64(masks.shape[1])):
+        masks[p, w] = np.uint64(0)
+    planes[NUMBER, p] = q
+    planes[DISTANCE, p] = distance
+    planes[ROW, p] = row
+    planes[ROW_WEIGHT, p] = j - row
+    planes[SLICE, p] = slice_
+    planes[SLICE_WEIGHT, p] = k - slice_
+    planes[CORNER, p] = (face[OFFSET_I] + face[ORIGIN_I] * ahead) / level.factor[0]
+    planes[STEP, p] = (face[OFFSET_PITCH] + face[PITCH] * ahead) / level.factor[0]
+    planes[LOW, p] = level.box[0]
+    planes[HIGH, p] = level.box[1]
+    planes[INTERVAL, p] = level.factor[2]
+    planes[LEVEL, p] = number
+    planes[SHARE, p] = share
+    return seen != np.uint64(0)
+
+
+@kernel
+def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk):
+    """Take the next sample planes, front to back, empty ones left out; returns their number.
+
+    `zone`: the distances from which the coarse level takes over, and at which it has; its share grows
+    linearly.
     """
-    low_j, high_j = box[2], box[3]
-    last_row = np.ceil(high_j) - 1.0
-    sign, e_k = face[SIGN], face[EYE_K]
-    first_k = 0.0 if sign > 0 else size_k - 1.0
-    spacing = 1.0 / per_interval
-    words = visible.shape[2]
-    count = 0
-    for q in range(first, end):
-        k = first_k + sign * (q * spacing)
-        distance = sign * (k - e_k)
-        j = offset_j + t_j * max(distance, 0.0)
-        j = min(max(j, low_j), high_j)
-        row, slice_ = min(np.floor(j), last_row), np.floor(k)
-        p, at_j, at_k = np.uint64(count), np.uint64(row), np.uint64(slice_)
-        seen = np.uint64(0)
-        for w in range(np.uint64(words)):
-            mask = pairs[at_j, at_k, w] if k != slice_ else visible[at_j, at_k, w]
-            masks[p, w] = mask
-            seen |= mask
-        if seen:
-            planes[NUMBER, p] = q
-            planes[DISTANCE, p] = distance
-            planes[ROW, p] = row
-            planes[ROW_WEIGHT, p] = j - row
-            planes[SLICE, p] = slice_
-            planes[SLICE_WEIGHT, p] = k - slice_
-            planes[CORNER, p] = face[OFFSET_I] + face[ORIGIN_I] * max(distance, 0.0)
-            planes[STEP, p] = face[OFFSET_PITCH] + face[PITCH] * max(distance, 0.0)
-            count += 1
-    return count
+    queue = chunk.queue
+    count = np.uint64(0)
+    while count < np.uint64(CHUNK):
+        fine_next, coarse_next = np.inf, np.inf
+        if queue[0] < queue[1]:
+            fine_next, _ = _plane_distance(queue[0], face, per_interval, fine)
+        if queue[2] < queue[3]:
+            coarse_next, _ = _plane_distance(queue[2], face, per_interval, coarse)
+        if fine_next <= coarse_next:
+            if fine_next == np.inf:
+                break
+            share = 1.0
+            if fine_next > zone[0]:
+                share = 1.0 - (fine_next - zone[0]) / (zone[1] - zone[0])
+            q = queue[0]
+            queue[0] += 1
+            if share > 0.0 and _place_plane(
+                count, q, 0.0, share, t_j, offset_j, face, per_interval, fine, chunk
+            ):
+                count += _ONE
+        else:
+            share = min((coarse_next - zone[0]) / (zone[1] - zone[0]), 1.0)
+            q = queue[2]
+            queue[2] += 1
+            if share > 0.0 and _place_plane(
+                count, q, 1.0, share, t_j, offset_j, face, per_interval, coarse, chunk
+            ):
+                count += _ONE
+    return np.int64(count)
 
 
 @inlined_kernel
@@ -95,27 +188,28 @@ def window(masks, p, block):
 
 
 @kernel
-def find_hits(pixel, count, stride_mask, box, beyond, planes, masks, hits):
-    """Which planes of the chunk a tile may meet: `hits` uint8 (CHUNK) is 1 for those, 0 for the others.
+def find_hits(pixel, count, stride_mask, beyond, chunk):
+    """Set the flags of the chunk's planes that a tile may meet.
 
     pixel: the tile's first; `stride_mask`: it takes the planes whose number has none of these bits; `beyond`:
     how far outside the box along i its pixels still read the box's border.
     """
-    low, high = box[0] - beyond, box[1] + beyond
-    last_cell = np.ceil(box[1]) - 1.0
+    planes, masks, flags = chunk.planes, chunk.masks, chunk.flags
     many = masks.shape[1] > 2
     centre, across = pixel + 0.5, np.float64(TILE - 1)
     for p in range(np.uint64(count)):
+        low, high = planes[LOW, p], planes[HIGH, p]
+        last_cell = np.ceil(high) - 1.0
         x_first = planes[CORNER, p] + centre * planes[STEP, p]
         x_last = x_first + across * planes[STEP, p]
-        reached = (x_last >= low) & (x_first <= high)
+        reached = (x_last >= low - beyond) & (x_first <= high + beyond)
         reached &= (np.int64(planes[NUMBER, p]) & stride_mask) == 0
-        begin = np.uint64(np.int64(min(max(x_first, box[0]), last_cell))) >> np.uint64(2)
-        end = np.uint64(np.int64(min(max(x_last, box[0]), last_cell))) >> np.uint64(2)
+        begin = np.uint64(np.int64(min(max(x_first, low), last_cell))) >> np.uint64(2)
+        end = np.uint64(np.int64(min(max(x_last, low), last_cell))) >> np.uint64(2)
         bits = window(masks, p, begin) if many else masks[p, np.uint64(0)] >> begin
         blocks = min(end - begin, _BITS)  # without the first
         bits &= (np.uint64(2) << blocks) - _ONE
         # A window of more than 64 blocks may hold more than these bits tell.
-        hits[p] = np.uint8(reached & ((bits != np.uint64(0)) | (end - begin > _BITS)))
+        flags[p] = np.uint8(reached & ((bits != np.uint64(0)) | (end - begin > _BITS)))
     for p in range(np.uint64(count), (np.uint64(count) + _EIGHT - _ONE) // _EIGHT * _EIGHT):
-        hits[p] = np.uint8(0)
+        flags[p] = np.uint8(0)

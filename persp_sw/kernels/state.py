@@ -1,4 +1,4 @@
-"""The pixels of a tile while it is composited: sections of 16 floats in a row of `lanes`, and α's polynomial."""
+"""The pixels of a tile while it is composited, sections of 16 floats in `lanes`; α's polynomial."""
 
 import numpy as np
 
