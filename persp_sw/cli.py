@@ -31,6 +31,10 @@ _OWN = {
         "Write a picture, its time and, if wanted, its measured error.",
     ),
     "demo": ("persp_sw.commands.demo:demo", "Show what it can do, on a real CT scan."),
+    "bench": (
+        "persp_sw.commands.bench:bench",
+        "Measure time, work, memory and error, beside other renderers.",
+    ),
 }
 _GROUP = "persp_sw.commands"
 

@@ -20,7 +20,7 @@ ProgressCall = Callable[[int, int, str], None]
 
 def print_json(values: dict[str, Any]) -> None:
     """One object on stdout; numbers that JSON cannot hold (NaN, infinity) become null."""
-    click.echo(json.dumps(_plain(values), ensure_ascii=False, allow_nan=False))
+    click.echo(json.dumps(plain(values), ensure_ascii=False, allow_nan=False))
 
 
 class _Console(Console):
@@ -74,13 +74,14 @@ def numbers(values: Any, digits: int = 6) -> str:
     return " × ".join(f"{value:.{digits}g}" for value in values)
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """What JSON can hold: arrays become lists, numbers that are not finite null, anything else its text."""
     if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value if isinstance(value, str | int | float | bool | type(None)) else str(value)

@@ -1,0 +1,38 @@
+"""Ways to sample, and switches to turn off: named changes of the settings, for charts and ablations.
+
+A new setting is one more line here. Lines whose setting this version does not have are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import Any
+
+from ..settings import Settings
+
+Changes = Mapping[str, Any]
+
+# Each a curve in the chart, along the qualities.
+MODES: dict[str, Changes] = {
+    "1 sample": {"samples_per_interval": 1},
+    "2 samples": {"samples_per_interval": 2},
+    "4 samples": {"samples_per_interval": 4},
+    "4 samples, residual 0.0005": {"samples_per_interval": 4, "residual": 0.0005},
+}
+
+# Each against the default.
+ABLATIONS: dict[str, Changes] = {
+    "no skipping": {"skip_empty": False},
+    "no termination": {"residual": 0.0},
+    "1 sample an interval": {"samples_per_interval": 1},
+    "2 samples an interval": {"samples_per_interval": 2},
+    "4 samples an interval": {"samples_per_interval": 4},
+    "a face for each axis": {"single_face_tangent": 1.0},
+}
+
+
+def available(table: Mapping[str, Changes], base: Settings) -> dict[str, Settings]:
+    """The settings that each line makes of `base`; only those that this version has."""
+    known = {field.name for field in fields(Settings)}
+    return {name: replace(base, **changes) for name, changes in table.items() if known >= set(changes)}

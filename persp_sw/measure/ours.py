@@ -1,0 +1,75 @@
+"""This renderer as a contestant: one group of settings on one scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import Any
+
+from ..arrays import Image
+from ..geometry.view import View
+from ..renderer import Renderer
+from ..settings import Settings
+from .cases import Stage
+from .memory import peak_bytes, restart_peak
+from .waste import samples_that_count
+
+_WARM_UPS = 4  # at most: until a frame neither compiles nor encodes
+
+
+@dataclass(eq=False)
+class Ours:
+    """A `timing.Contestant`; several may share a renderer, whose settings it sets for its turn."""
+
+    renderer: Renderer
+    settings: Settings
+    once: dict[str, float] = field(default_factory=lambda: {"encode_ms": 0.0, "compile_ms": 0.0})
+
+    def prepare(self, view: View) -> None:
+        """Warm up; what is encoded or compiled now is kept in `once`."""
+        self.renderer.settings = self.settings
+        for _ in range(_WARM_UPS):
+            self.renderer.render(view)
+            spent = {name: self.renderer.last[name] for name in self.once}
+            for name, ms in spent.items():
+                self.once[name] += ms
+            if not any(spent.values()):
+                break
+
+    def draw(self, view: View) -> dict[str, float]:
+        """One frame: compositing and warp on the processor."""
+        start = perf_counter()
+        self.renderer.render(view)
+        ms = 1e3 * (perf_counter() - start)
+        last = self.renderer.last
+        return {"ms": ms, "composite_ms": last["composite_ms"], "warp_ms": last["warp_ms"]}
+
+    def picture(self, view: View) -> Image:
+        """The picture that is judged."""
+        self.renderer.settings = self.settings
+        return self.renderer.render(view)
+
+    def counts(self, stage: Stage, view: View) -> dict[str, Any]:
+        """Work and memory for one view: samples, waste, faces, bytes."""
+        self.renderer.settings = self.settings
+        afresh = restart_peak()
+        eye_image = self.renderer.composite(view.eye, [view.wall])
+        self.renderer.warp(eye_image, view)
+        last, peak = dict(self.renderer.last), peak_bytes()
+        needed = samples_that_count(
+            eye_image,
+            [view.wall],
+            stage.volume,
+            stage.transfer,
+            self.settings,
+            stage.regions,
+            last.get("samples_per_interval"),
+        )
+        return {
+            **{name: last[name] for name in ("faces", "intermediate_size", "samples", "runs_bytes")},
+            "needed_samples": round(needed),
+            "waste": last["samples"] / needed if needed else None,
+            "dense_bytes": stage.volume.data.nbytes,
+            "peak_bytes": peak,
+            "peak_of": "frame" if afresh else "process",
+        }
