@@ -35,6 +35,8 @@ _OWN = {
         "persp_sw.commands.bench:bench",
         "Measure time, work, memory and error, beside other renderers.",
     ),
+    "chart": ("persp_sw.commands.chart:chart", "Draw time against accuracy, for all ways to sample."),
+    "warmup": ("persp_sw.commands.warmup:warmup", "Compile what a first picture would wait for."),
 }
 _GROUP = "persp_sw.commands"
 

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from ..errors import FileError, PerspSWError, SettingsError
-from .choose_cases import case_options, chosen_cases, threads_chosen
+from .choose_cases import case_options, chosen_cases, peer_option, threads_chosen
 from .options import json_option
 from .output import plain, print_json, progress_bars
 
@@ -45,13 +45,7 @@ At equal accuracy: our time at the quality whose PSNR is the peer's.
     "--samples", type=click.Choice(["1", "2", "4"]), help="From slice to slice; automatic by default."
 )
 @click.option("--seconds", type=float, help="Timed for each contestant of a case. [default: 1]")
-@click.option(
-    "--peer",
-    "peers",
-    multiple=True,
-    type=click.Choice(["vtk", "vtk-fixed", "vtk-fixed-2px", "vtk-gpu"]),
-    help="Measure VTK on the same cases too. Repeatable.",
-)
+@peer_option
 @click.option("--ablate", is_flag=True, help="Switch parts of the renderer off, one at a time.")
 @click.option("--quick", is_flag=True, help="A made-up 128³ volume, small pictures, little time.")
 @click.option("-o", "--out", type=click.Path(), help="JSON file, written anew after each case.")

@@ -35,6 +35,16 @@ def print_tables(result: Row) -> None:
             click.echo(click.style(f"{row['case']} {row['renderer']}: ", fg="red") + row["error"], err=True)
 
 
+def print_chart(values: Row) -> None:
+    """Where our best settings are, and how they compare with the peers."""
+    for row in values["rows"]:
+        row["front"] = "•" if row.get("on_front") else ""
+    _print("time against accuracy", _CHART, values["rows"])
+    if values["equal_accuracy"]:
+        _print("at equal accuracy, read off the front", _CHART_EQUAL, values["equal_accuracy"])
+    click.echo(f"the chart is {values['out']}")
+
+
 def _print(title: str, columns: Columns, rows: Sequence[Row]) -> None:
     """A table with a heading for each case; as wide as it must be, for a cut figure is no figure."""
     table = Table(box=SIMPLE, title=title, title_justify="left", title_style="bold", pad_edge=False)
@@ -126,4 +136,22 @@ _ABLATION: Columns = [
     ("PSNR", _number("psnr", ".1f")),
     ("change dB", _number("psnr_change", "+.2f")),
     ("runs MB", _number("runs_bytes", ".1f", 1e-6)),
+]
+_CHART: Columns = [
+    ("with", lambda row: f"q {row['quality']:.3g}, {row['mode']}" if "mode" in row else row["renderer"]),
+    ("thr", lambda row: str(row["threads"])),
+    ("ms", _milliseconds("ms")),
+    ("p95", _milliseconds("ms_p95")),
+    ("PSNR", _number("psnr", ".1f")),
+    ("covered", _number("psnr_covered", ".1f")),
+    ("mean error", _number("mean_signed_error", "+.1e")),
+    ("front", lambda row: row["front"]),
+]
+_CHART_EQUAL: Columns = [
+    ("peer", lambda row: row["renderer"]),
+    ("thr", lambda row: str(row["threads"])),
+    ("peer ms", _milliseconds("ms")),
+    ("dB", _number("psnr", ".1f")),
+    ("ours ms", _milliseconds("equal_ms")),
+    ("ratio", lambda row: _ratio("ratio")(row) or "not reached"),
 ]

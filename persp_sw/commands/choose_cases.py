@@ -34,6 +34,13 @@ _OPTIONS = [
     click.option("--data", type=click.Path(), help="Folder of real volumes. [default: $PERSP_SW_DATA]"),
     click.option("--cache", type=click.Path(), help="Folder to keep reference pictures in."),
 ]
+peer_option = click.option(
+    "--peer",
+    "peers",
+    multiple=True,
+    type=click.Choice(["vtk", "vtk-fixed", "vtk-fixed-2px", "vtk-gpu"]),
+    help="Measure VTK on the same cases too: both mappers, or one. Repeatable.",
+)
 
 
 def case_options(function: Function) -> Function:

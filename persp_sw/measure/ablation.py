@@ -27,9 +27,9 @@ def ablate(case: Case, plan: Plan) -> list[Row]:
             if name == DEFAULT or settings != base:
                 plan.progress(len(contestants), len(switches), "encoding")
                 renderer = Renderer(stage.volume, stage.transfer, settings, stage.regions)
-                renderer.render(stage.views[0])
-                row = {**case.labels, "switch": name, **settings_row(settings)}
-                contestants.append((row, Ours(renderer, settings)))
+                ours = Ours(renderer, settings)
+                ours.prepare(stage.views[0])
+                contestants.append(({**case.labels, "switch": name, **settings_row(settings)}, ours))
         truth = plan.truths.of(stage.volume, stage.transfer, stage.views[-1], stage.regions, plan.progress)
     except PerspSWError as error:
         return [{**case.labels, "switch": DEFAULT, "renderer": "persp_sw", "error": str(error)}]

@@ -53,12 +53,15 @@ class Plan:
         Groups of settings; the first is the one that peers are compared with at its own quality.
     seconds
         Timed for each contestant.
+    search
+        Whether to look for our settings that equal each peer's accuracy.
     """
 
     settings: Sequence[Settings]
     truths: Truths
     seconds: float = 1.0
     peers: Sequence[Peer] = ()
+    search: bool = True
     progress: Progress = field(default=lambda done, total, what: None)
 
 
@@ -74,13 +77,13 @@ def measure(case: Case, plan: Plan) -> list[Row]:
         stage = case.open()
         view = stage.views[-1]
         renderer = Renderer(stage.volume, stage.transfer, plan.settings[0], stage.regions)
-        renderer.render(stage.views[0])  # whether it can be rendered shows here
+        first = Ours(renderer, plan.settings[0])
+        first.prepare(stage.views[0])  # whether it can be rendered shows here
         truth = plan.truths.of(stage.volume, stage.transfer, view, stage.regions, plan.progress)
     except PerspSWError as error:
         return [{**case.labels, "renderer": "persp_sw", "error": str(error)}]
-    contestants: list[tuple[Row, Any]] = []
-    for settings in plan.settings:
-        contestants.append(({**case.labels, **settings_row(settings)}, Ours(renderer, settings)))
+    ours = [first, *(Ours(renderer, settings) for settings in plan.settings[1:])]
+    contestants: list[tuple[Row, Any]] = [({**case.labels, **settings_row(o.settings)}, o) for o in ours]
     failed = []
     for peer in plan.peers:
         row = {**case.labels, "renderer": peer.name, "threads": peer.threads}
@@ -91,7 +94,8 @@ def measure(case: Case, plan: Plan) -> list[Row]:
             failed.append({**row, "error": str(error)})
             continue
         contestants.append((row, peer))
-    contestants += _equals(case, plan, contestants, renderer, view, truth)
+    if plan.search:
+        contestants += _equals(case, plan, contestants, renderer, view, truth)
     try:
         return time_rows(contestants, stage, truth, plan) + failed
     except PerspSWError as error:  # on the way: an eye that walks into the volume, a peer that dies

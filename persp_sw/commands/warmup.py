@@ -1,0 +1,103 @@
+"""`persp-sw warmup`: compile, or load, all that a first picture would wait for."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from time import perf_counter
+from typing import Any
+
+import click
+
+from ..errors import ViewError
+from .options import json_option
+from .output import print_facts, print_json, progress_bars
+
+_EPILOG = """\b
+Examples:
+  persp-sw warmup
+  persp-sw warmup --reference
+  persp-sw warmup --json
+
+\b
+Compiled kernels are kept on disk, for this version of the sources and this
+processor; a second warmup only loads them.
+"""
+_EDGE = 24  # voxels: small, yet with empty blocks
+
+
+@click.command(epilog=_EPILOG)
+@click.option("--reference", "judge", is_flag=True, help="The reference ray caster and its figures too.")
+@json_option
+def warmup(judge: bool, as_json: bool) -> None:
+    """Compile the kernels that a normal run needs, so that the first picture later is quick.
+
+    It renders small made-up volumes of each voxel type: see-through and opaque, from outside, from a corner
+    and from inside.
+    """
+    start = perf_counter()
+    from .. import _jit
+
+    steps: list[dict[str, Any]] = [{"what": "start numba", "ms": 1e3 * (perf_counter() - start)}]
+    from ..arrays import VOXEL_DTYPES
+
+    names = [dtype.name for dtype in VOXEL_DTYPES]
+    with progress_bars() as progress:
+        for number, name in enumerate(names):
+            progress(number, len(names) + judge, "kernels")
+            steps.append(_timed(f"{name} volumes", lambda name=name: _render(name)))
+        if judge:
+            progress(len(names), len(names) + 1, "kernels")
+            steps.append(_timed("reference", _judge))
+        progress(len(names) + judge, len(names) + judge, "kernels")
+    values = {
+        "ms": 1e3 * (perf_counter() - start),
+        "compile_ms": 1e3 * _jit.compile_seconds(),
+        "steps": steps,
+    }
+    if as_json:
+        print_json(values)
+        return
+    print_facts({step["what"]: f"{step['ms'] / 1e3:.2f} s" for step in steps})
+    compiled = values["compile_ms"] / 1e3
+    click.echo(
+        f"\nready in {values['ms'] / 1e3:.1f} s"
+        + (f", {compiled:.1f} s of it compiling" if compiled else "; nothing had to be compiled")
+    )
+
+
+def _timed(what: str, work: Any) -> dict[str, Any]:
+    start = perf_counter()
+    work()
+    return {"what": what, "ms": 1e3 * (perf_counter() - start)}
+
+
+def _render(name: str) -> None:
+    """One sample an interval and several, one face and several; from inside too."""
+    from ..measure.cases import eye_path, transfer_for
+    from ..renderer import Renderer
+    from ..settings import Settings
+    from ..volume.phantoms import synthetic_ct
+
+    volume = synthetic_ct(_EDGE, dtype=name)
+    renderer = Renderer(volume, transfer_for("ct", "fog", volume))
+    for function in ("fog", "surface"):
+        renderer.transfer = transfer_for("ct", function, volume)
+        for look in ("front", "corner", "inside"):
+            view = eye_path(volume, look, (48, 48), frames=0)[0]
+            for samples in (None, 4):
+                renderer.settings = Settings(samples_per_interval=samples)
+                with suppress(ViewError):  # an eye inside, where that is refused, needs no kernel
+                    renderer.render(view)
+
+
+def _judge() -> None:
+    from .. import reference
+    from ..measure.cases import eye_path, transfer_for
+    from ..measure.metrics import compare
+    from ..volume.phantoms import synthetic_ct
+
+    volume = synthetic_ct(_EDGE)
+    transfer = transfer_for("ct", "ramp", volume)
+    view = eye_path(volume, "front", (16, 16), frames=0)[0]
+    truth = reference.render(volume, transfer, view, tolerance=1e-3)
+    compare(truth, truth)
