@@ -13,7 +13,6 @@ import sys
 import traceback
 import warnings
 from collections.abc import Sequence
-from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 import click
@@ -124,6 +123,8 @@ class Program(click.Group):
 
 
 def _others() -> dict[str, Any]:
+    from importlib.metadata import entry_points  # takes 25 ms, which our own commands need not wait for
+
     return {point.name: point for point in entry_points(group=_GROUP)}
 
 

@@ -41,7 +41,7 @@ def print_chart(values: Row) -> None:
         row["front"] = "•" if row.get("on_front") else ""
     _print("time against accuracy", _CHART, values["rows"])
     if values["equal_accuracy"]:
-        _print("at equal accuracy, read off the front", _CHART_EQUAL, values["equal_accuracy"])
+        _print("at equal accuracy, between measured points", _CHART_EQUAL, values["equal_accuracy"])
     click.echo(f"the chart is {values['out']}")
 
 

@@ -8,12 +8,13 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+if TYPE_CHECKING:
+    from rich.console import Console  # takes 30 ms, which a picture need not wait for
 
 ProgressCall = Callable[[int, int, str], None]
 
@@ -23,16 +24,17 @@ def print_json(values: dict[str, Any]) -> None:
     click.echo(json.dumps(plain(values), ensure_ascii=False, allow_nan=False))
 
 
-class _Console(Console):
-    """rich's, but a reader that has left is the program's to handle, not a reason to exit here."""
-
-    def on_broken_pipe(self) -> None:
-        raise BrokenPipeError(errno.EPIPE, "the reader has left")
-
-
 def console() -> Console:
     """Where tables go: stdout, in colour where it is a terminal."""
-    return _Console(highlight=False, soft_wrap=not sys.stdout.isatty())
+    from rich.console import Console
+
+    class OurConsole(Console):
+        """rich's, but a reader that has left is the program's to handle, not a reason to exit here."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError(errno.EPIPE, "the reader has left")
+
+    return OurConsole(highlight=False, soft_wrap=not sys.stdout.isatty())
 
 
 @contextmanager
@@ -41,6 +43,9 @@ def progress_bars() -> Iterator[ProgressCall]:
     if not sys.stderr.isatty():
         yield lambda done, total, what: None
         return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         tasks: dict[str, Any] = {}

@@ -53,25 +53,26 @@ def front(ms: Sequence[float], psnr: Sequence[float]) -> list[int]:
     return kept
 
 
-def time_at(target: float, ms: Sequence[float], psnr: Sequence[float]) -> float | None:
-    """Time at which a front, fastest first, reaches `target` dB: log(ms) is linear between its points.
+def time_at(target: float, rows: Sequence[Row]) -> float | None:
+    """Our time at `target` dB: the least of all modes', log(ms) linear between a mode's points.
 
-    The fastest point's time where even that is more accurate; None where none is accurate enough.
+    A mode's fastest point where even that is more accurate; None where no mode is accurate enough.
     """
-    if not len(psnr) or target > psnr[-1]:
-        return None
-    return float(np.exp(np.interp(target, psnr, np.log(ms))))
+    times = []
+    for mode in dict.fromkeys(row["mode"] for row in rows if "mode" in row):
+        ms, psnr = zip(*((row["ms"], row["psnr"]) for row in rows if row.get("mode") == mode), strict=True)
+        kept = front(ms, psnr)
+        if target <= psnr[kept[-1]]:
+            times.append(np.interp(target, [psnr[n] for n in kept], [np.log(ms[n]) for n in kept]))
+    return float(np.exp(min(times))) if times else None
 
 
 def figures(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """For each peer its time over ours at its accuracy, read off the front; None where it is not reached."""
-    ours = [row for row in rows if row.get("on_front")]
-    ours.sort(key=lambda row: row["ms"])
-    ms, psnr = [row["ms"] for row in ours], [row["psnr"] for row in ours]
+    """For each peer its time over ours at its accuracy, between measured points; None if not reached."""
     result = []
     for row in rows:
         if row["renderer"] != "persp_sw":
-            equal = time_at(row["psnr"], ms, psnr)
+            equal = time_at(row["psnr"], rows)
             result.append(
                 {
                     **{name: row[name] for name in ("case", "renderer", "threads", "ms", "psnr")},

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .bench import Row
-from .chart import figures
+from .chart import figures, time_at
 
 # Colours that most colour-blind people tell apart (Okabe and Ito).
 _COLOURS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#e69f00")
@@ -23,7 +23,7 @@ _NAMED = (0.5, 1, 2, 4, 8)  # qualities
 
 
 def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
-    """A panel for each case; one curve a mode along the qualities, the front in black, the peers in grey.
+    """A panel for each case; one curve a mode along the qualities, the best of all broad and grey, the peers.
 
     Parameters
     ----------
@@ -60,9 +60,10 @@ def _panel(axis: Axes, rows: Sequence[Row]) -> None:
     ours = [row for row in rows if "mode" in row]
     peers = [row for row in rows if row["renderer"] != "persp_sw"]
     best = sorted((row for row in ours if row["on_front"]), key=lambda row: row["ms"])
+    accuracies = np.linspace(min(row["psnr"] for row in best), max(row["psnr"] for row in best), 300)
     axis.plot(
-        [row["ms"] for row in best],
-        [row["psnr"] for row in best],
+        [time_at(psnr, ours) for psnr in accuracies],
+        accuracies,
         color=_INK,
         linewidth=4,
         alpha=0.15,
@@ -102,9 +103,8 @@ def _name_qualities(axis: Axes, best: Sequence[Row]) -> None:
     """The quality beside some points of the front."""
     named: list[Row] = []
     for row in best:
-        beside = any(
-            abs(np.log(row["ms"] / n["ms"])) < 0.05 and n["quality"] == row["quality"] for n in named
-        )
+        same = [other for other in named if other["quality"] == row["quality"]]
+        beside = any(abs(np.log(row["ms"] / other["ms"])) < 0.05 for other in same)
         if row["quality"] in _NAMED and not beside:
             named.append(row)
             axis.annotate(
@@ -142,7 +142,7 @@ def _draw_peers(axis: Axes, peers: Sequence[Row], rows: Sequence[Row]) -> None:
                 zorder=2,
             )
         axis.annotate(
-            "more than ours" if figure["ratio"] is None else f"{figure['ratio']:.2g} ×",
+            "not reached" if figure["ratio"] is None else f"{figure['ratio']:.2g} ×",
             (row["ms"], row["psnr"]),
             xytext=(-6, 4),
             textcoords="offset points",

@@ -66,7 +66,7 @@ class Truths:
         """(h, w, 4) linear premultiplied; rounded to float32, 6e-8."""
         path = self.folder / f"{key_of(volume, transfer, view, regions)}.npz"
         try:
-            with np.load(path, allow_pickle=False) as file:
+            with path.open("rb") as source, np.load(source, allow_pickle=False) as file:
                 return file["truth"]
         except (OSError, EOFError, KeyError, ValueError, BadZipFile):
             pass  # not there, or damaged: cast it

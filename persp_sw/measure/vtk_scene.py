@@ -29,6 +29,7 @@ from vtkmodules.vtkRenderingCore import (
 )
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper, vtkGPUVolumeRayCastMapper
 
+from ..errors import SettingsError
 from ..geometry.regions import Regions
 from ..geometry.view import View
 from ..optics.transfer import TransferFunction
@@ -135,11 +136,16 @@ def _prop(volume: Volume, transfer: TransferFunction, regions: Regions, mapper) 
     looks.SetInterpolationTypeToLinear()
     mapper.SetInputData(image)
     if regions.crop is not None:
-        low, high = regions.box(volume)
-        mapper.SetCroppingRegionPlanes(*(np.array([low, high]) * volume.spacing).T.ravel())
-        mapper.SetCroppingRegionFlagsToSubVolume()
+        mapper.SetCroppingRegionPlanes(*np.array(regions.crop) * np.repeat(volume.spacing, 2))
+        mapper.SetCroppingRegionFlags(regions.crop_flags)
         mapper.CroppingOn()
-    for plane in regions.clip:
+    planes = list(regions.clip)
+    for cut in regions.cut:
+        if cut.show == "outside":
+            raise SettingsError("VTK cannot leave out a slab: take the scene's cut with show = outside away")
+        plane, reach = np.array(cut.plane), cut.thickness / 2 * np.linalg.norm(cut.plane[:3])
+        planes += [plane + (0, 0, 0, reach), (0, 0, 0, reach) - plane]
+    for plane in planes:
         normal = np.array(plane[:3])
         clip = vtkPlane()
         clip.SetNormal(*normal)
