@@ -14,8 +14,6 @@ from .cases import Stage
 from .memory import peak_bytes, restart_peak
 from .waste import samples_that_count
 
-_WARM_UPS = 4  # at most: until a frame neither compiles nor encodes
-
 
 @dataclass(eq=False)
 class Ours:
@@ -26,15 +24,10 @@ class Ours:
     once: dict[str, float] = field(default_factory=lambda: {"encode_ms": 0.0, "compile_ms": 0.0})
 
     def prepare(self, view: View) -> None:
-        """Warm up; what is encoded or compiled now is kept in `once`."""
-        self.renderer.settings = self.settings
-        for _ in range(_WARM_UPS):
-            self.renderer.render(view)
-            spent = {name: self.renderer.last[name] for name in self.once}
-            for name, ms in spent.items():
-                self.once[name] += ms
-            if not any(spent.values()):
-                break
+        """A frame to warm up; what is encoded or compiled now is counted in `once`."""
+        self.picture(view)
+        for name in self.once:
+            self.once[name] += self.renderer.last[name]
 
     def draw(self, view: View) -> dict[str, float]:
         """One frame: compositing and warp on the processor."""
