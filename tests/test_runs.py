@@ -7,7 +7,7 @@ import twins
 from persp_sw import TransferFunction, Volume
 from persp_sw.optics.classification import Classification
 from persp_sw.volume.levels import BlockBounds, standard_rows
-from persp_sw.volume.runs import EverythingVisible, RunStore
+from persp_sw.volume.runs import PADDING, EverythingVisible, RunStore
 
 SHAPES = [(2, 2, 2), (5, 6, 7), (9, 40, 3), (4, 5, 270), (3, 2, 258), (2, 3, 257)]
 DTYPES = [np.uint8, np.int16, np.uint16, np.float32]
@@ -88,6 +88,18 @@ def test_nothing_visible_and_everything_visible():
         np.testing.assert_array_equal(decoded, standard_rows(volume, axis))
     assert clear.visible_box() is None
     np.testing.assert_array_equal(full.visible_box(), [[0, 0, 0], [8, 6, 5]])
+
+
+@pytest.mark.parametrize("visibility", [EverythingVisible(), None])
+@pytest.mark.parametrize("dtype", DTYPES)
+def test_vectors_may_be_read_beyond_both_ends_of_the_stored_voxels(dtype, visibility):
+    volume = Volume(np.full((3, 4, 5), 50, dtype))
+    clear = Classification.of(TransferFunction([(0, (1, 1, 1), 0)]), volume)
+    runs = RunStore(volume, visibility or clear).axis(0)
+    assert runs.voxels.size == runs.voxel_count + 2 * PADDING
+    assert runs.offsets.flat[0] == PADDING == 128
+    assert not runs.voxels[:PADDING].any() and not runs.voxels[-PADDING:].any()
+    assert runs.voxels[PADDING:-PADDING].all()
 
 
 def test_nan_voxels_hide_nothing_else():

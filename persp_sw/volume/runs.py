@@ -17,8 +17,8 @@ from ..kernels import encode
 from .grid import Volume
 from .levels import STANDARD_AXES, BlockBounds, standard_rows
 
-# Packed voxels are read 16 at a time, the last packet beyond the end.
-_PADDING = 64
+# Packed voxels are read in vectors that may begin before a run and end after it.
+PADDING = 128
 
 
 class Visibility(Protocol):
@@ -53,7 +53,7 @@ class AxisRuns:
     offsets
         int64 [n_j, n_k, words]: where each word's voxels start.
     voxels
-        The stored voxels, scanline by scanline, then padding.
+        `PADDING` zeros, the stored voxels, scanline by scanline, and `PADDING` zeros.
     """
 
     size: tuple[int, int, int]  # n_i, n_j, n_k
@@ -72,7 +72,7 @@ class AxisRuns:
     @property
     def voxel_count(self) -> int:
         """Number of stored voxels."""
-        return self.voxels.size - _PADDING
+        return self.voxels.size - 2 * PADDING
 
     @property
     def index_bytes(self) -> int:
@@ -224,8 +224,8 @@ class RunStore:
         encode.count_voxels(needed, n_i, counts, runs)
         self._report(2, axis)
         ends = np.cumsum(counts.reshape(-1))
-        offsets = (ends - counts.reshape(-1)).reshape(counts.shape)
-        voxels = np.zeros(int(counts.sum()) + _PADDING, rows.dtype)
+        offsets = PADDING + (ends - counts.reshape(-1)).reshape(counts.shape)
+        voxels = np.zeros(int(counts.sum()) + 2 * PADDING, rows.dtype)
         encode.pack(rows, needed, offsets, voxels)
         self._report(3, axis)
         return AxisRuns((n_i, n_j, n_k), visible, between, needed, offsets, voxels, int(runs.sum()))
