@@ -70,6 +70,7 @@ from numba.extending import intrinsic  # noqa: E402
 __all__ = [
     "VECTORS",
     "allocating_kernel",
+    "bits_of",
     "compile_seconds",
     "inlined_kernel",
     "intrinsic",
@@ -116,6 +117,19 @@ def trailing_zeros(_context, word):
 
 
 @intrinsic
+def bits_of(_context, flags):
+    """Which of the first 64 bytes of a contiguous uint8 array are not 0, as uint64; the first is bit 0."""
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        bytes_ = ir.VectorType(ir.IntType(8), 64)
+        loaded = builder.load(builder.bitcast(data, bytes_.as_pointer()), align=1)
+        return builder.bitcast(builder.icmp_unsigned("!=", loaded, bytes_(None)), ir.IntType(64))
+
+    return types.uint64(flags), build
+
+
+@intrinsic
 def power_of_two(_context, shifted):
     """2^n as float32, where `shifted` = 1.5·2^23 + n is float32 and n an integer, −126 … 127.
 
@@ -133,7 +147,7 @@ def power_of_two(_context, shifted):
 
 
 class _CompileClock(event.Listener):
-    """Seconds that numba spent compiling; nested compilations are counted once."""
+    """Seconds that numba's compiler was busy or being waited for; what is nested is counted once."""
 
     def __init__(self):
         self.seconds = 0.0
@@ -152,11 +166,12 @@ class _CompileClock(event.Listener):
 
 
 _clock = _CompileClock()
-event.register("numba:compile", _clock)
+# Held while a kernel is compiled and while it is loaded from disk; numba has no event for loading alone.
+event.register("numba:compiler_lock", _clock)
 
 
 def compile_seconds() -> float:
-    """Seconds spent compiling kernels so far; loading them from disk is not compiling."""
+    """Seconds spent so far on compiling kernels or loading them from disk."""
     return _clock.seconds
 
 

@@ -18,7 +18,8 @@ from .optics.presets import choose
 from .optics.transfer import TransferFunction
 from .settings import Settings
 from .volume.grid import Volume
-from .volume.runs import EverythingVisible, RunStore
+from .volume.runs import RunStore
+from .volume.visibility import EverythingVisible
 from .warp.software import warp_eye_image
 
 _log = logging.getLogger("persp_sw")

@@ -7,7 +7,8 @@ import twins
 from persp_sw import TransferFunction, Volume
 from persp_sw.optics.classification import Classification
 from persp_sw.volume.levels import BlockBounds, standard_rows
-from persp_sw.volume.runs import PADDING, EverythingVisible, RunStore
+from persp_sw.volume.runs import PADDING, RunStore
+from persp_sw.volume.visibility import EverythingVisible
 
 SHAPES = [(2, 2, 2), (5, 6, 7), (9, 40, 3), (4, 5, 270), (3, 2, 258), (2, 3, 257)]
 DTYPES = [np.uint8, np.int16, np.uint16, np.float32]
@@ -35,6 +36,29 @@ def test_block_bounds_equal_their_twin(shape, dtype):
         expected_low, expected_high = twins.block_bounds(standard_rows(volume, axis))
         np.testing.assert_array_equal(low, expected_low)
         np.testing.assert_array_equal(high, expected_high)
+
+
+@pytest.mark.parametrize("dtype", DTYPES)
+@pytest.mark.parametrize("shape", SHAPES)
+def test_brick_bounds_equal_their_twin(shape, dtype):
+    volume = sparse_volume(shape, dtype, share=0.1)
+    low, high = BlockBounds(volume).bricks()
+    expected_low, expected_high = twins.brick_bounds(volume.data)
+    np.testing.assert_array_equal(low, expected_low)
+    np.testing.assert_array_equal(high, expected_high)
+
+
+def test_nan_moves_no_bound():
+    data = np.random.default_rng(3).normal(size=(9, 11, 14)).astype(np.float32)
+    data[data > 0.5] = np.nan
+    data[:6, :6, :6] = np.nan  # whole blocks and a whole brick, which keep low > high
+    bounds = BlockBounds(Volume(data))
+    for axis in range(3):
+        expected = twins.block_bounds(standard_rows(bounds.volume, axis))
+        np.testing.assert_array_equal(bounds.of(axis), expected)
+        assert (bounds.of(axis)[0] > bounds.of(axis)[1]).any()
+    np.testing.assert_array_equal(bounds.bricks(), twins.brick_bounds(data))
+    assert bounds.bricks()[0][0, 0, 0] > bounds.bricks()[1][0, 0, 0]
 
 
 @pytest.mark.parametrize("pairs", [False, True])
@@ -118,7 +142,7 @@ def test_visible_box_holds_what_is_visible_and_little_more():
     volume = Volume(data)
     low, high = RunStore(volume, Classification.of(bump(), volume)).visible_box()
     tight_low, tight_high = np.array([20, 10, 6]), np.array([30, 15, 9])
-    slack = np.array([3, 0, 0])  # blocks are four cells long
+    slack = 3  # bricks are four cells long
     assert (tight_low - slack <= low).all() and (low <= tight_low).all()
     assert (tight_high <= high).all() and (high <= tight_high + slack).all()
 
@@ -151,6 +175,13 @@ def test_thin_volumes_encode_to_a_report(shape):
         assert store.report(axis).dense_bytes == volume.data.nbytes
 
 
+def test_the_box_of_what_is_visible_needs_no_axis():
+    store = RunStore(sparse_volume((9, 6, 7), np.uint8), EverythingVisible())
+    store.visible_box()
+    assert store.bytes == 0
+    assert store.bounds_bytes == 2 * 2 * 2 * 2  # two bounds of 2 × 2 × 2 bricks
+
+
 def test_report_counts_runs_and_bytes():
     data = np.zeros((8, 8, 64), np.uint8)
     data[3, 3, 10:12] = 50
@@ -160,6 +191,7 @@ def test_report_counts_runs_and_bytes():
     assert (report.axis, report.runs, report.voxels, report.mean_length) == ("z", 3, 15, 5.0)
     assert report.voxels_bytes == 15
     assert report.bytes == report.voxels_bytes + report.index_bytes
+    assert report.bounds_bytes == 2 * (7 * 8 * 16)  # two bounds of 16 blocks of 7 scanline pairs in 8 slices
     assert report.dense_bytes == 8 * 8 * 64
 
 

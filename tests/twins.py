@@ -20,18 +20,33 @@ def block_bounds(rows):
     return low, high
 
 
+def brick_bounds(data):
+    """(low, high) [z, y, x] of bricks of 4³ cells, voxels 4m … 4m + 4 along each axis, NaN left out."""
+    counts = [-(-(n - 1) // BLOCK) for n in data.shape]
+    low, high = np.empty((2, *counts))
+    for brick in np.ndindex(*counts):
+        voxels = data[tuple(slice(BLOCK * m, BLOCK * m + BLOCK + 1) for m in brick)].astype(float)
+        low[brick] = np.where(np.isnan(voxels), np.inf, voxels).min()
+        high[brick] = np.where(np.isnan(voxels), -np.inf, voxels).max()
+    return low, high
+
+
 def entries(values, origin, scale, last):
     """Table row of each value: nearest entry, 1 … last."""
     return np.clip(np.floor((values - origin) * scale + 1.5), 1, last).astype(int)
 
 
-def visible_blocks(low, high, table, origin, scale):
-    """Whether an entry from that of `low` to that of `high` has extinction, values a rounding wider."""
+def visible_blocks(low, high, table, origin, scale, largest=None):
+    """Whether an entry from that of `low` to that of `high` has extinction, values a rounding wider.
+
+    `largest`: magnitude of values that float32 rounds; of the bounds themselves where not given.
+    """
     last = len(table) - 1
     result = np.zeros(low.shape, bool)
+    largest = max(np.abs(low).max(), np.abs(high).max()) if largest is None else largest
+    rounding = 0.01 / scale + 1e-6 * largest if scale else 0
     for index in np.ndindex(low.shape):
         if low[index] <= high[index]:
-            rounding = 0.01 / scale + 1e-6 * max(abs(low[index]), abs(high[index])) if scale else 0
             first = entries(low[index] - rounding, origin, scale, last)
             end = entries(high[index] + rounding, origin, scale, last)
             result[index] = (table[first : end + 1, 3] > 0).any()

@@ -80,7 +80,8 @@ def gather(scene: Scene, progress: ProgressCall | None = None) -> dict[str, Any]
 
         renderer = Renderer(volume, scene.transfer, progress=progress)
         reports = [renderer.runs.report(axis) for axis in range(3)]
-        keys = ("axis", "runs", "mean_length", "bytes", "voxels_bytes", "index_bytes", "dense_bytes")
+        keys = ("axis", "runs", "mean_length", "bytes", "voxels_bytes", "index_bytes", "bounds_bytes")
+        keys += ("dense_bytes",)
         values["axes"] = [{key: getattr(report, key) for key in keys} for report in reports]
     return values
 

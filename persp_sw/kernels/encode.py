@@ -6,109 +6,59 @@ scanlines j and j + 1. Blocks are kept as bits, 64 to a word: word w, bit s is b
 a bit keep the index of a scanline of 256 voxels in one word.
 
 A block is visible if the transfer function can see a value between the smallest and the largest of its
-voxels. A scanline stores the voxels of its visible blocks, packed without gaps: a run of blocks [s, e) stores
-voxels 4s … 4e, the last of them shared with nobody.
+voxels (`kernels/bounds.py`). A scanline stores the voxels of its visible blocks, packed without gaps: a run
+of blocks [s, e) stores voxels 4s … 4e, the last of them shared with nobody.
 """
 
 import numpy as np
 
-from .._jit import inlined_kernel, kernel, parallel_kernel, popcount, prange, trailing_zeros
+from .._jit import bits_of, inlined_kernel, kernel, parallel_kernel, popcount, prange, trailing_zeros
 
 BLOCK = 4  # cells in a block
 WORD = 64  # blocks in a word
 
 _ONE, _TWO = np.uint64(1), np.uint64(2)
-
-
-@parallel_kernel
-def block_bounds(rows, low, high):
-    """Smallest and largest voxel of every block, NaN left out.
-
-    `rows` [j, k, i]; `low` and `high` [n_j − 1, n_k, blocks] of the same type come filled with the type's
-    largest and smallest number, which all-NaN blocks keep.
-    """
-    n_i = rows.shape[2]
-    for j in prange(low.shape[0]):
-        for k in range(low.shape[1]):
-            for m in range(low.shape[2]):
-                smallest = low[j, k, m]
-                largest = high[j, k, m]
-                for i in range(BLOCK * m, min(BLOCK * m + BLOCK + 1, n_i)):
-                    for row in range(j, j + 2):
-                        voxel = rows[row, k, i]
-                        if voxel < smallest:
-                            smallest = voxel
-                        if voxel > largest:
-                            largest = voxel
-                low[j, k, m] = smallest
-                high[j, k, m] = largest
+_TILE = 64  # scanlines turned at a time: a cache line of 8-bit voxels
+_APART = 64  # voxels between them: powers of two would share a few lines of the cache
 
 
 @kernel
-def _is_visible(low, high, seen, origin, scale):
-    """Whether any table entry that an interpolated value in [low, high] may fetch has extinction.
+def _flag(low, high, other_low, other_high, first, last, flags):
+    """Set the flags of blocks of which one of both lows is ≤ last and one of both highs ≥ first."""
+    for m in range(np.uint64(low.shape[0])):
+        begins = (low[m] <= last) | (other_low[m] <= last)
+        ends = (high[m] >= first) | (other_high[m] >= first)
+        flags[m] |= np.uint8(begins & ends)
 
-    `seen[n]`: number of entries with extinction before entry n. Entry of a value: round((value − origin)·
-    scale) + 1, clamped. float32 interpolation overshoots by a few roundings of the value, and the entry's
-    own arithmetic errs by less than 0.01 for up to 4096 entries; a whole entry more on each side, the simple
-    rule, would make air visible wherever a ramp begins at its value.
+
+@parallel_kernel
+def mark_visible(low, high, first, last, visible):
+    """Bits of the visible blocks, of slices or of slice pairs.
+
+    Parameters
+    ----------
+    low, high
+        [n_j, n_k, blocks]: bounds of the blocks of slices.
+    first, last
+        Of the same type: a block is visible if low ≤ last[n] and high ≥ first[n] for any n.
+    visible
+        uint64 [n_j, n_k, words], overwritten; [n_j, n_k − 1, words] for the slice pairs (k, k + 1).
     """
-    if not low <= high:
-        return False
-    last = seen.shape[0] - 2
-    slack = 0.01 + 1e-6 * max(abs(low), abs(high)) * scale
-    first_entry = min(max((low - origin) * scale + 1.5 - slack, 1.0), np.float64(last))
-    last_entry = min(max((high - origin) * scale + 1.5 + slack, 1.0), np.float64(last))
-    return seen[np.int64(last_entry) + 1] > seen[np.int64(first_entry)]
-
-
-@parallel_kernel
-def mark_visible_cells(low, high, seen, origin, scale, visible):
-    """Bits of the visible blocks of single slices: `visible` [n_j − 1, n_k, words], overwritten."""
+    to_other = low.shape[1] - visible.shape[1]
+    words = visible.shape[2]
     for j in prange(visible.shape[0]):
+        flags = np.empty(WORD * words, np.uint8)
         for k in range(visible.shape[1]):
-            for w in range(visible.shape[2]):
-                word = np.uint64(0)
-                for m in range(WORD * w, min(WORD * (w + 1), low.shape[2])):
-                    if _is_visible(np.float64(low[j, k, m]), np.float64(high[j, k, m]), seen, origin, scale):
-                        word |= _ONE << np.uint64(m - WORD * w)
-                visible[j, k, w] = word
-
-
-@parallel_kernel
-def mark_visible_pairs(low, high, seen, origin, scale, visible):
-    """Bits of the visible blocks of slice pairs (k, k + 1): `visible` [n_j − 1, n_k − 1, words]."""
-    for j in prange(visible.shape[0]):
-        for k in range(visible.shape[1]):
-            for w in range(visible.shape[2]):
-                word = np.uint64(0)
-                for m in range(WORD * w, min(WORD * (w + 1), low.shape[2])):
-                    smallest = np.float64(min(low[j, k, m], low[j, k + 1, m]))
-                    largest = np.float64(max(high[j, k, m], high[j, k + 1, m]))
-                    if _is_visible(smallest, largest, seen, origin, scale):
-                        word |= _ONE << np.uint64(m - WORD * w)
-                visible[j, k, w] = word
-
-
-@parallel_kernel
-def mark_needed(visible, pairs, needed):
-    """Blocks whose voxels scanline (j, k) must store: those of every visible block that touches it.
-
-    `needed` [n_j, n_k, words]; `pairs`: the blocks of `visible` span slices k and k + 1.
-    """
-    for j in prange(needed.shape[0]):
-        for k in range(needed.shape[1]):
-            k_first = max(k - 1, 0) if pairs else k
-            for w in range(needed.shape[2]):
-                word = np.uint64(0)
-                for row in range(max(j - 1, 0), min(j + 1, visible.shape[0])):
-                    for slice_ in range(k_first, min(k + 1, visible.shape[1])):
-                        word |= visible[row, slice_, w]
-                needed[j, k, w] = word
+            flags[:] = 0
+            other = k + to_other
+            for n in range(first.shape[0]):
+                _flag(low[j, k], high[j, k], low[j, other], high[j, other], first[n], last[n], flags)
+            for w in range(words):
+                visible[j, k, w] = bits_of(flags[WORD * w : WORD * (w + 1)])
 
 
 @kernel
-def run_ends(needed, j, k, w):
+def _run_ends(needed, j, k, w):
     """Bits of the last blocks of the runs of one scanline's word; a run may go on in the next word."""
     word = needed[j, k, w]
     following = word >> _ONE
@@ -118,60 +68,124 @@ def run_ends(needed, j, k, w):
 
 
 @parallel_kernel
-def count_voxels(needed, n_i, counts, runs):
-    """Voxels stored and runs ended in every word of every scanline; both [n_j, n_k, words], int64."""
+def mark_needed(visible, pairs, n_i, needed, counts, runs):
+    """Blocks whose voxels scanline (j, k) must store: those of every visible block that touches it.
+
+    Parameters
+    ----------
+    visible
+        Bits of the visible blocks; with `pairs` those of slices k and k + 1.
+    n_i
+        Voxels of a scanline.
+    needed, counts
+        [n_j, n_k, words], overwritten: bits of the needed blocks, and how many voxels each word stores.
+    runs
+        int64 [n_j], overwritten: number of runs of the scanlines j.
+    """
     last = (n_i - 2) // BLOCK  # the last block may be shorter
     for j in prange(needed.shape[0]):
+        ended = 0
         for k in range(needed.shape[1]):
+            k_first = max(k - 1, 0) if pairs else k
+            for w in range(needed.shape[2]):
+                word = np.uint64(0)
+                for row in range(max(j - 1, 0), min(j + 1, visible.shape[0])):
+                    for slice_ in range(k_first, min(k + 1, visible.shape[1])):
+                        word |= visible[row, slice_, w]
+                needed[j, k, w] = word
             for w in range(needed.shape[2]):
                 word = needed[j, k, w]
-                ends = np.int64(popcount(run_ends(needed, j, k, w)))
+                ends = np.int64(popcount(_run_ends(needed, j, k, w)))
                 count = BLOCK * np.int64(popcount(word)) + ends
                 if w == last // WORD and (word >> np.uint64(last % WORD)) & _ONE:
                     count -= BLOCK + 1 - (n_i - BLOCK * last)
                 counts[j, k, w] = count
-                runs[j, k, w] = ends
+                ended += ends
+        runs[j] = ended
+
+
+@kernel
+def _copy_runs(needed, offsets, j, k, scanline, packed, unpack):
+    """Copy the needed voxels of one scanline to where they are packed, or back."""
+    n_i = scanline.shape[0]
+    for w in range(needed.shape[2]):
+        word = needed[j, k, w]
+        ends = _run_ends(needed, j, k, w)
+        at = offsets[j, k, w]
+        while word:
+            s = trailing_zeros(word)
+            n = trailing_zeros(~(word >> s))
+            word &= word + (_ONE << s)
+            shared = np.int64((ends >> (s + n - _ONE)) & _ONE)
+            begin = BLOCK * (WORD * w + np.int64(s))
+            end = min(begin + BLOCK * np.int64(n) + shared, n_i)
+            there, here = packed[at : at + end - begin], scanline[begin:end]
+            if unpack:
+                for i in range(np.uint64(end - begin)):
+                    here[i] = there[i]
+            else:
+                for i in range(np.uint64(end - begin)):
+                    there[i] = here[i]
+            at += end - begin
+
+
+@kernel
+def _transpose_needed(plane, needed, buffer):
+    """buffer[x, i] = plane[i, x] for the blocks that any scanline `needed` [x, words] needs."""
+    n_i, n_x = plane.shape
+    for w in range(needed.shape[1]):
+        word = np.uint64(0)
+        for x in range(n_x):
+            word |= needed[x, w]
+        while word:
+            begin = BLOCK * (WORD * w + np.int64(trailing_zeros(word)))
+            word &= word - _ONE
+            for i in range(begin, min(begin + BLOCK + 1, n_i)):
+                row = plane[i]
+                for x in range(np.uint64(n_x)):
+                    buffer[x, np.uint64(i)] = row[x]
 
 
 @parallel_kernel
-def pack(rows, needed, offsets, voxels):
-    """Copy the needed voxels of `rows` [j, k, i] to `voxels`; word (j, k, w) starts at its offset."""
-    n_i = rows.shape[2]
-    for j in prange(needed.shape[0]):
-        for k in range(needed.shape[1]):
-            for w in range(needed.shape[2]):
-                word = needed[j, k, w]
-                ends = run_ends(needed, j, k, w)
-                at = offsets[j, k, w]
-                while word:
-                    s = trailing_zeros(word)
-                    word &= word - _ONE
-                    first = BLOCK * (WORD * w + np.int64(s))
-                    extra = np.int64((ends >> s) & _ONE)
-                    for i in range(first, min(first + BLOCK + extra, n_i)):
-                        voxels[at] = rows[j, k, i]
-                        at += 1
+def pack_along_x(voxels, needed, offsets, packed):
+    """Copy the needed voxels of `voxels` [z, y, x] for principal axis z, each word's to its offset."""
+    for y in prange(needed.shape[0]):
+        for z in range(needed.shape[1]):
+            _copy_runs(needed, offsets, y, z, voxels[z, y], packed, False)
 
 
 @parallel_kernel
-def unpack(needed, offsets, voxels, rows, stored):
-    """Inverse of `pack`: fills the stored voxels of `rows` [j, k, i] and sets `stored` (bool) there."""
-    n_i = rows.shape[2]
+def pack_along_y(voxels, needed, offsets, packed):
+    """The same for principal axis x: scanlines along y, tiles of which are turned in the cache."""
+    n_z, n_y, n_x = voxels.shape
+    for z in prange(n_z):
+        buffer = np.empty((_TILE, n_y + _APART), voxels.dtype)
+        for begin in range(0, n_x, _TILE):
+            end = min(begin + _TILE, n_x)
+            _transpose_needed(voxels[z, :, begin:end], needed[z, begin:end], buffer)
+            for x in range(begin, end):
+                _copy_runs(needed, offsets, z, x, buffer[x - begin, :n_y], packed, False)
+
+
+@parallel_kernel
+def pack_along_z(voxels, needed, offsets, packed):
+    """The same for principal axis y: scanlines along z, tiles of which are turned in the cache."""
+    n_z, n_y, n_x = voxels.shape
+    for y in prange(n_y):
+        buffer = np.empty((_TILE, n_z + _APART), voxels.dtype)
+        for begin in range(0, n_x, _TILE):
+            end = min(begin + _TILE, n_x)
+            _transpose_needed(voxels[:, y, begin:end], needed[begin:end, y], buffer)
+            for x in range(begin, end):
+                _copy_runs(needed, offsets, x, y, buffer[x - begin, :n_z], packed, False)
+
+
+@parallel_kernel
+def unpack(needed, offsets, packed, rows):
+    """Inverse of packing: fills the stored voxels of `rows` [j, k, i], contiguous."""
     for j in prange(needed.shape[0]):
         for k in range(needed.shape[1]):
-            for w in range(needed.shape[2]):
-                word = needed[j, k, w]
-                ends = run_ends(needed, j, k, w)
-                at = offsets[j, k, w]
-                while word:
-                    s = trailing_zeros(word)
-                    word &= word - _ONE
-                    first = BLOCK * (WORD * w + np.int64(s))
-                    extra = np.int64((ends >> s) & _ONE)
-                    for i in range(first, min(first + BLOCK + extra, n_i)):
-                        rows[j, k, i] = voxels[at]
-                        stored[j, k, i] = True
-                        at += 1
+            _copy_runs(needed, offsets, j, k, rows[j, k], packed, True)
 
 
 @inlined_kernel

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +14,13 @@ from .. import _jit
 from ..arrays import Voxels
 from ..kernels import encode
 from .grid import Volume
-from .levels import STANDARD_AXES, BlockBounds, standard_rows
+from .levels import BlockBounds, standard_rows
+from .visibility import Visibility, visible_intervals
 
 # Packed voxels are read in vectors that may begin before a run and end after it.
 PADDING = 128
 
-
-class Visibility(Protocol):
-    """What the store must know of a classification; see `optics.classification.Classification`."""
-
-    seen: NDArray[np.int64]
-    origin: float
-    scale: float
-
-
-class EverythingVisible:
-    """A `Visibility` that skips only blocks of NaN: for measuring what skipping saves."""
-
-    seen = np.array([0, 0, 1], np.int64)
-    origin = 0.0
-    scale = 0.0
+_PACK = {0: encode.pack_along_y, 1: encode.pack_along_z, 2: encode.pack_along_x}
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +70,8 @@ class AxisRuns:
         n_i, n_j, n_k = self.size
         rows = np.zeros((n_j, n_k, n_i), self.voxels.dtype)
         stored = np.zeros(rows.shape, np.bool_)
-        encode.unpack(self.needed, self.offsets, self.voxels, rows, stored)
+        encode.unpack(self.needed, self.offsets, self.voxels, rows)
+        encode.unpack(self.needed, self.offsets, np.ones(self.voxels.shape, np.bool_), stored)
         return rows, stored
 
 
@@ -98,11 +85,12 @@ class RunReport:
     voxels: int
     voxels_bytes: int
     index_bytes: int
+    bounds_bytes: int
     dense_bytes: int
 
     @property
     def bytes(self) -> int:
-        """Stored voxels and their index."""
+        """Stored voxels and their index, without the blocks' bounds."""
         return self.voxels_bytes + self.index_bytes
 
 
@@ -154,20 +142,17 @@ class RunStore:
     def visible_box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Lowest and highest corner, object space, of all that can be seen; None if nothing can.
 
-        From the blocks of slice pairs, which contain those of every axis' slices; blocks make it up to three
-        cells wide of the mark.
+        From bricks of 4³ cells, so up to three cells wide of the mark, and no axis need be encoded for it.
         """
         if self._box is None:
-            axis = 2  # always the same, or the picture would depend on what was encoded before
             box = np.empty(6, np.int64)
             with self._timed():
-                encode.bounding_box(self._mark(axis, pairs=True), box)
-            j0, j1, k0, k1, m0, m1 = box.tolist()
+                encode.bounding_box(self._mark(*self.bounds.bricks()), box)
+            z0, z1, y0, y1, x0, x1 = box.tolist()
             low, high = np.full(3, np.inf), np.full(3, -np.inf)
-            if j0 <= j1:
-                axes = list(STANDARD_AXES[axis])
-                low[axes] = encode.BLOCK * m0, j0, k0
-                high[axes] = encode.BLOCK * (m1 + 1), j1 + 1, k1 + 1
+            if z0 <= z1:
+                low = encode.BLOCK * np.array([x0, y0, z0], np.float64)
+                high = encode.BLOCK * np.array([x1 + 1, y1 + 1, z1 + 1], np.float64)
                 high = np.minimum(high, np.array(self.volume.size) - 1)
             self._box = low, high
         return self._box if (self._box[0] <= self._box[1]).all() else None
@@ -183,6 +168,7 @@ class RunStore:
             voxels=runs.voxel_count,
             voxels_bytes=runs.voxel_count * itemsize,
             index_bytes=runs.index_bytes,
+            bounds_bytes=sum(bound.nbytes for bound in self.bounds.of(axis)),
             dense_bytes=self.volume.data.nbytes,
         )
 
@@ -190,6 +176,11 @@ class RunStore:
     def bytes(self) -> int:
         """Memory of the axes encoded so far: voxels and index, without the blocks' bounds."""
         return sum(runs.voxel_count * runs.voxels.itemsize + runs.index_bytes for runs in self._axes.values())
+
+    @property
+    def bounds_bytes(self) -> int:
+        """Memory of the bounds computed so far, of blocks and bricks; they outlive the transfer function."""
+        return self.bounds.bytes
 
     def _report(self, step: int, axis: int) -> None:
         if self.progress:
@@ -202,30 +193,29 @@ class RunStore:
         yield
         self.encode_seconds += max(perf_counter() - _jit.compile_seconds() - start, 0.0)
 
-    def _mark(self, axis: int, *, pairs: bool) -> NDArray[np.uint64]:
-        low, high = self.bounds.of(axis)
+    def _mark(self, low: NDArray, high: NDArray, *, pairs: bool = False) -> NDArray[np.uint64]:
         n_j, n_k, n_m = low.shape
         visible = np.empty((n_j, n_k - 1 if pairs else n_k, -(-n_m // encode.WORD)), np.uint64)
-        mark = encode.mark_visible_pairs if pairs else encode.mark_visible_cells
-        mark(low, high, self._visibility.seen, self._visibility.origin, self._visibility.scale, visible)
+        encode.mark_visible(low, high, *visible_intervals(self._visibility, self.volume), visible)
         return visible
 
     def _encode(self, axis: int, pairs: bool) -> AxisRuns:
-        rows = standard_rows(self.volume, axis)
-        n_j, n_k, n_i = rows.shape
+        n_j, n_k, n_i = standard_rows(self.volume, axis).shape
         self._report(0, axis)
-        visible = self._mark(axis, pairs=False)
-        between = self._mark(axis, pairs=True) if pairs else np.empty((0, 0, visible.shape[2]), np.uint64)
-        needed = np.empty((n_j, n_k, visible.shape[2]), np.uint64)
+        bounds = self.bounds.of(axis)
+        visible = self._mark(*bounds)
+        between = self._mark(*bounds, pairs=True) if pairs else np.empty((0, 0, visible.shape[2]), np.uint64)
         self._report(1, axis)
-        encode.mark_needed(between if pairs else visible, pairs, needed)
+        needed = np.empty((n_j, n_k, visible.shape[2]), np.uint64)
         counts = np.empty(needed.shape, np.int64)
-        runs = np.empty(needed.shape, np.int64)
-        encode.count_voxels(needed, n_i, counts, runs)
+        runs = np.empty(n_j, np.int64)
+        encode.mark_needed(between if pairs else visible, pairs, n_i, needed, counts, runs)
+        ends = PADDING + np.cumsum(counts.reshape(-1))
+        offsets = (ends - counts.reshape(-1)).reshape(counts.shape)
         self._report(2, axis)
-        ends = np.cumsum(counts.reshape(-1))
-        offsets = PADDING + (ends - counts.reshape(-1)).reshape(counts.shape)
-        voxels = np.zeros(int(counts.sum()) + 2 * PADDING, rows.dtype)
-        encode.pack(rows, needed, offsets, voxels)
+        voxels = np.empty(int(counts.sum()) + 2 * PADDING, self.volume.data.dtype)
+        voxels[:PADDING] = voxels[-PADDING:] = 0
+        if needed.size:
+            _PACK[axis](self.volume.data, needed, offsets, voxels)
         self._report(3, axis)
         return AxisRuns((n_i, n_j, n_k), visible, between, needed, offsets, voxels, int(runs.sum()))
