@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from . import _jit
 from .arrays import Image
-from .errors import EyeInsideVolumeError
 from .eye_image import EyeImage
 from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.parts import Part, shown_parts
@@ -35,13 +34,7 @@ def composite_eye(
     eye: Eye,
     walls: Sequence[Wall],
 ) -> EyeImage:
-    """The eye image that all of `walls` need; no faces where no wall shows anything visible.
-
-    Raises
-    ------
-    EyeInsideVolumeError
-        The eye is in the box of what can be seen.
-    """
+    """The eye image that all of `walls` need; no faces where no wall shows anything visible."""
     volume = store.volume
     pose = volume.world_from_object
     object_from_world = np.linalg.inv(pose)
@@ -49,14 +42,8 @@ def composite_eye(
     parts, low, high = _seen_parts(store, regions, eye_object)
     faces: list[Face] = []
     if parts:
-        if (eye_object >= low).all() and (eye_object <= high).all():
-            raise EyeInsideVolumeError(
-                f"the eye {eye.position.tolist()} is inside the visible part of the volume (voxel "
-                f"{np.round(eye_object, 2).tolist()} in {low.tolist()} … {high.tolist()}); views from inside "
-                "are not available yet: move the eye out, or crop the volume"
-            )
         views = [View(eye, wall) for wall in walls]
-        geometry = EyeGeometry(eye_object, low, high, views, object_from_world[:3, :3])
+        geometry = EyeGeometry(eye_object, low, high, views, object_from_world[:3, :3], eye.near)
         faces = plan_faces(
             geometry,
             quality=settings.quality,

@@ -21,10 +21,6 @@ class ViewError(PerspSWError):
     """An eye, wall or view that cannot be rendered."""
 
 
-class EyeInsideVolumeError(ViewError):
-    """The eye stands inside the visible part of the volume, which this version cannot render."""
-
-
 class SettingsError(PerspSWError):
     """A setting outside its range."""
 

@@ -8,7 +8,7 @@ from tolerances import FLOAT32_IMAGE, PICTURE_SMOOTH_DB, PICTURE_SURFACE_DB
 from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
-from persp_sw.errors import EyeInsideVolumeError, SettingsError
+from persp_sw.errors import SettingsError
 from persp_sw.measure.metrics import compare, psnr
 from persp_sw.volume.phantoms import synthetic_ct
 
@@ -130,20 +130,6 @@ def test_one_compositing_serves_several_walls_and_none_costs_nothing():
     assert not renderer.warp(image, away).any()
     assert renderer.composite(away.eye, [away.wall]).samples == 0
     assert renderer.last["faces"] == 0 and renderer.last["intermediate_size"] == [0, 0]
-
-
-def test_an_eye_inside_has_its_own_error_and_outside_what_is_visible_is_outside():
-    data = np.zeros((40, 40, 40), np.uint8)
-    data[:, :, 25:] = 200
-    volume = Volume(data)
-    renderer = Renderer(volume, TransferFunction(SMOOTH))
-    inside = View.look_at((30, 20, 20), (0, 20, 20), (0, 1, 0), 60, (32, 32))
-    with pytest.raises(EyeInsideVolumeError, match="inside the visible part"):
-        renderer.render(inside)
-    # In the empty part of the box the eye is as good as outside.
-    view = View.look_at((8, 20, 20), (39, 21, 20.5), (0, 1, 0), 60, (64, 64))
-    picture = renderer.render(view)
-    assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SURFACE_DB
 
 
 @pytest.mark.parametrize("size", [(1, 1, 1), (1, 8, 8), (8, 1, 8), (8, 8, 1)])

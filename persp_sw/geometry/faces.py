@@ -22,6 +22,8 @@ from .view import View
 _QUANTILE = 0.1
 # Points a side of the grid on which a wall's pixel size is measured.
 _GRID = 24
+# An eye so near to the plane of a side (voxels) is in it.
+_TOUCHES = 1e-9
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,8 @@ class EyeGeometry:
         The walls through which this eye looks.
     object_from_world
         Linear part, (3, 3).
+    near
+        World distance from the eye, along each ray, before which nothing is shown.
     """
 
     eye: NDArray[np.float64]
@@ -79,6 +83,12 @@ class EyeGeometry:
     high: NDArray[np.float64]
     views: Sequence[View]
     object_from_world: Matrix
+    near: float = 0.0
+
+    @property
+    def inside(self) -> bool:
+        """Whether the eye is in the box, its sides included."""
+        return bool((self.eye >= self.low - _TOUCHES).all() and (self.eye <= self.high + _TOUCHES).all())
 
 
 def plan_faces(
@@ -87,7 +97,7 @@ def plan_faces(
     """The faces that hold a ray which meets the box and some wall's frustum; none if no ray does.
 
     One face serves while no such ray has a tangent beyond `single_face_tangent` in it; else several do, each
-    limited to its own rays (largest |component|).
+    limited to its own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
     """
     polygons = [p for view in geometry.views for p in _seen_polygons(geometry, view)]
     if not polygons:
@@ -132,10 +142,17 @@ def _seen_polygons(geometry: EyeGeometry, view: View) -> list[NDArray[np.float64
 
 
 def _box_sides(low: NDArray[np.float64], high: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Those sides of a box, relative to the eye, that the eye does not see edge-on.
+
+    A ray that is in the box for more than a point crosses two sides, at most one of which holds the eye; so
+    every such ray meets one of these, from without or from within.
+    """
     sides = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         for end in (low, high):
+            if abs(end[axis]) <= _TOUCHES:
+                continue
             side = np.empty((4, 3))
             side[:, axis] = end[axis]
             side[:, u] = low[u], high[u], high[u], low[u]
@@ -194,10 +211,11 @@ def _face(
     max_size: int,
 ) -> Face:
     """The face that holds the rays to `points`, as far as their tangents are below `limit`."""
-    t_i, t_j, distance = tangents(points[points[:, axis] * sign > 0], axis, sign).T
+    points = points[points[:, axis] * sign > 0]
+    t_i, t_j, distance = tangents(points, axis, sign).T
     low = np.clip([t_i.min(), t_j.min()], -limit, limit)
     high = np.clip([t_i.max(), t_j.max()], -limit, limit)
-    pitch = max(_volume_pitch(distance), _wall_pitch(geometry, axis, sign)) / quality
+    pitch = max(_volume_pitch(geometry, points, distance), _wall_pitch(geometry, axis, sign, limit)) / quality
     margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
     largest = (high - low).max()
     # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made of
@@ -212,18 +230,26 @@ def _face(
     return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width, height))
 
 
-def _volume_pitch(distance: NDArray[np.float64]) -> float:
-    """One pixel a voxel on the nearest slice, but no finer than half a pixel a voxel on the farthest."""
-    return 1 / max(distance.min(), distance.max() / 2)
+def _volume_pitch(geometry: EyeGeometry, points: NDArray[np.float64], distance: NDArray[np.float64]) -> float:
+    """One pixel a voxel on the nearest slice, but no finer than half a pixel a voxel on the farthest.
+
+    The nearest is where `points` on the box's sides begin; from inside it is the eye's own, or where the near
+    distance lets it begin.
+    """
+    front = 0.0 if geometry.inside else distance.min()
+    if geometry.near:
+        world = np.linalg.norm(points @ np.linalg.inv(geometry.object_from_world).T, axis=-1)
+        front = max(front, geometry.near * (distance / world).min())
+    return 1 / max(front, distance.max() / 2)
 
 
-def _wall_pitch(geometry: EyeGeometry, axis: int, sign: int) -> float:
+def _wall_pitch(geometry: EyeGeometry, axis: int, sign: int, limit: float) -> float:
     """The finest that the walls can show of this face, in tangents; 0 where they show nothing of it."""
-    finest = [_pixel_tangent(geometry, view, axis, sign) for view in geometry.views]
+    finest = [_pixel_tangent(geometry, view, axis, sign, limit) for view in geometry.views]
     return min((size for size in finest if size > 0), default=0.0)
 
 
-def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int) -> float:
+def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int, limit: float) -> float:
     """Smaller singular value of ∂t/∂pixel: a low quantile over the pixels that show the box here."""
     width, height = view.size
     matrix = geometry.object_from_world @ view.direction_from_pixel
@@ -234,6 +260,8 @@ def _pixel_tangent(geometry: EyeGeometry, view: View, axis: int, sign: int) -> f
     shown = _meets_box(directions, geometry.low - geometry.eye, geometry.high - geometry.eye)
     i, j, k = STANDARD_AXES[axis]
     shown &= directions[:, k] * sign > 0
+    if limit < np.inf:
+        shown &= np.abs(directions[:, [i, j]]).max(1) <= limit * np.abs(directions[:, k])
     directions = directions[shown]
     if not len(directions):  # nothing, or smaller than the grid: take the middle of what is seen
         seen = np.concatenate([np.empty((0, 3)), *_seen_polygons(geometry, view)])
