@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from .kernels.composite import Table
 from .kernels.composite import composite as composite_face
 from .kernels.scanline import Level
 from .optics.classification import Classification
+from .seams import close_seams
 from .settings import Settings
 from .volume.levels import STANDARD_AXES
 from .volume.runs import RunStore
@@ -33,8 +35,12 @@ def composite_eye(
     settings: Settings,
     eye: Eye,
     walls: Sequence[Wall],
+    previous: Sequence[Face] = (),
 ) -> EyeImage:
-    """The eye image that all of `walls` need; no faces where no wall shows anything visible."""
+    """The eye image that all of `walls` need; no faces where no wall shows anything visible.
+
+    `previous`: the faces of this eye's frame before, which are kept where they serve about as well.
+    """
     volume = store.volume
     pose = volume.world_from_object
     object_from_world = np.linalg.inv(pose)
@@ -49,17 +55,20 @@ def composite_eye(
             quality=settings.quality,
             single_face_tangent=settings.single_face_tangent,
             max_size=settings.max_intermediate,
+            intermediate_size=settings.intermediate_size,
+            previous=previous,
         )
     pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
-    samples, start = 0, 0
-    for face in faces:
-        width, height = face.size
-        out = pixels[start : start + width * height].reshape(height, width, 4)
-        start += width * height
-        for part in parts:
-            samples += _composite(store, classification, part, settings, eye, eye_object, face, threads, out)
-    return EyeImage(eye, pose, tuple(faces), pixels, samples)
+    image = EyeImage(eye, pose, tuple(faces), pixels, 0)
+    images = [image.face_pixels(number) for number in range(len(faces))]
+    samples = sum(
+        _composite(store, classification, part, settings, eye, eye_object, face, threads, out)
+        for face, out in zip(faces, images, strict=True)
+        for part in parts
+    )
+    close_seams(faces, images)
+    return replace(image, samples=samples)
 
 
 def _seen_parts(

@@ -87,8 +87,12 @@ class Renderer:
         self._classification = Classification.of(self._transfer, self.volume)
         self.runs.classify(self._visibility())
 
-    def composite(self, eye: Eye, walls: Sequence[Wall]) -> EyeImage:
-        """One eye image that serves all `walls`; ViewError where the eye cannot be served.
+    def composite(self, eye: Eye, walls: Sequence[Wall], previous: EyeImage | None = None) -> EyeImage:
+        """One eye image that serves all `walls`; the eye may be anywhere, inside the volume too.
+
+        `previous`, this eye's image of the frame before, makes the choice of faces and pitch stay where it is
+        while it serves about as well, so that an eye at rest between two choices does not flicker. Without it
+        nothing depends on earlier frames.
 
         Cost: one compositing, whatever the number of walls; none where no wall shows anything visible.
         """
@@ -97,7 +101,15 @@ class Renderer:
             self.runs.classify(self._visibility())
         compiled, encoded = _jit.compile_seconds(), self.runs.encode_seconds
         start = perf_counter()
-        image = composite_eye(self.runs, self._classification, self.regions, self.settings, eye, walls)
+        image = composite_eye(
+            self.runs,
+            self._classification,
+            self.regions,
+            self.settings,
+            eye,
+            walls,
+            previous.faces if previous else (),
+        )
         spent = perf_counter() - start
         compiled, encoded = _jit.compile_seconds() - compiled, self.runs.encode_seconds - encoded
         self.last = {

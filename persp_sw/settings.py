@@ -27,6 +27,10 @@ class Settings:
         One face of the eye image serves while no ray is steeper against it than this tangent, 1 … 8.
     skip_empty
         Leave out what the transfer function makes invisible. Changes no pixel; off only for measuring.
+    intermediate_size
+        Pixels of the largest face's longer side, 16 … `max_intermediate`; `quality` then does nothing. Up to
+        four fewer, for pixels have their places; a width is a multiple of 16.
+        None: as `quality` says.
     max_intermediate
         Largest width and height of a face, pixels.
     threads
@@ -44,6 +48,7 @@ class Settings:
     single_face_tangent: float = 3.0
     skip_empty: bool = True
     max_intermediate: int = 4096
+    intermediate_size: int | None = None
     threads: int | None = None
 
     def __post_init__(self):
@@ -52,6 +57,9 @@ class Settings:
         number(self.single_face_tangent, "single_face_tangent", SettingsError, 1, 8)
         number(self.max_intermediate, "max_intermediate", SettingsError, 16, 16384)
         self._check_whole("max_intermediate")
+        if self.intermediate_size is not None:
+            number(self.intermediate_size, "intermediate_size", SettingsError, 16, self.max_intermediate)
+            self._check_whole("intermediate_size")
         if self.samples_per_interval is not None:
             self._check_whole("samples_per_interval")
             if self.samples_per_interval not in (1, 2, 4):

@@ -40,6 +40,7 @@ def exact_face(image, number, volume, regions, extinction):
             decided &= met | never
         near = np.where(slope > 0, np.maximum(near, crossing), near)
         far = np.where(slope < 0, np.minimum(far, crossing), far)
+        far = np.where((slope == 0) & (offset < 0), -np.inf, far)
     way = np.maximum(far - near, 0)
     alpha = -np.expm1(-extinction * length * way)
     planes = 4 * max(volume.size)

@@ -52,6 +52,9 @@ comes before them. --quality and --samples change speed and error, never the loo
 @click.option(
     "--tolerance", type=float, default=1e-5, show_default=True, help="How far the reference may be unsettled."
 )
+@click.option(
+    "--intermediate", type=int, metavar="N", help="Pixels of the eye image's longer side; replaces --quality."
+)
 @setting_options
 @view_options
 @region_options
@@ -62,6 +65,7 @@ def render(
     out: str | None,
     judge: bool,
     tolerance: float,
+    intermediate: int | None,
     quality: float,
     samples: str | None,
     residual: float,
@@ -84,6 +88,7 @@ def render(
             samples_per_interval=int(samples) if samples else chosen.samples_per_interval,
             residual=residual,
             threads=threads,
+            intermediate_size=intermediate,
         )
         values = {"scene": scene, **shoot(chosen, path, settings, tolerance if judge else None, progress)}
     say_missing_voxels(chosen.volume)

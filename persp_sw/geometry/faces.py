@@ -24,6 +24,14 @@ _QUANTILE = 0.1
 _GRID = 24
 # An eye so near to the plane of a side (voxels) is in it.
 _TOUCHES = 1e-9
+# Rays this far (pixels) beyond the last pixel's centre are still found.
+_GUARD = 1e-6
+# A rectangle of n pitches takes up to n + 3 pixels, whatever its position against the pixels.
+_EXTRA = 3
+# With several faces, pixels from the middle of a face to its seam are a multiple of this.
+_STEP = 8
+# What a previous frame chose stays while nothing is better by this factor.
+_STAY = 1.1
 
 
 @dataclass(frozen=True)
@@ -92,32 +100,48 @@ class EyeGeometry:
 
 
 def plan_faces(
-    geometry: EyeGeometry, *, quality: float, single_face_tangent: float, max_size: int
+    geometry: EyeGeometry,
+    *,
+    quality: float,
+    single_face_tangent: float,
+    max_size: int,
+    intermediate_size: int | None = None,
+    previous: Sequence[Face] = (),
 ) -> list[Face]:
     """The faces that hold a ray which meets the box and some wall's frustum; none if no ray does.
 
     One face serves while no such ray has a tangent beyond `single_face_tangent` in it; else several do, each
     limited to its own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
+
+    Pixel centres lie at odd multiples of half the pitch. So a picture keeps its rays when its rectangle grows
+    by a pixel, none of them lies in a slice or a side, where nobody can decide, and where several faces meet,
+    at a tangent of ±1, both have pixels on the same rays: they share one pitch, 2 over an odd number.
+
+    `intermediate_size` replaces `quality`: the largest face gets so many pixels on its longer side, or up to
+    four less, its width rounded up to a packet's 16. `previous` are the faces of the frame before, which are
+    kept a little beyond the point where others would be chosen, so that an eye at rest on that point does not
+    make the picture flicker.
     """
     polygons = [p for view in geometry.views for p in _seen_polygons(geometry, view)]
     if not polygons:
         return []
-    points = np.concatenate(polygons)
-    single = _single_face(points, single_face_tangent)
-    if single is not None:
-        parts = {single: points}
-    else:
-        parts = {}
-        for axis in range(3):
-            for sign in (-1, 1):
-                own = [_clip(polygon, _pyramid(axis, sign)) for polygon in polygons]
-                own = [polygon for polygon in own if len(polygon)]
-                if own:
-                    parts[axis, sign] = np.concatenate(own)
+    single = _single_face(np.concatenate(polygons), single_face_tangent, previous)
+    parts = _parts(polygons) if single is None else {single: np.concatenate(polygons)}
     limit = np.inf if single is not None else 1.0
-    return [
-        _face(geometry, axis, sign, part, limit, quality, max_size) for (axis, sign), part in parts.items()
-    ]
+    rectangles = {key: _Rectangle.of(points, *key, limit) for key, points in parts.items()}
+    longest = max(rectangle.longest for rectangle in rectangles.values())
+    if intermediate_size:
+        pitch = longest / (intermediate_size - _EXTRA) or 1.0
+    else:
+        pitches = [_pitch(geometry, rectangle, *key, limit) for key, rectangle in rectangles.items()]
+        pitch = _common_pitch(pitches, list(rectangles.values())) / quality
+        # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made
+        # of its own margins.
+        pitch = min(pitch, longest / (TILE - _EXTRA) or pitch)
+    pitch = max(pitch, longest / (max_size // TILE * TILE - _EXTRA))
+    if single is None:
+        pitch = _seam_pitch(pitch, longest, previous, exact=bool(intermediate_size), max_size=max_size)
+    return [rectangle.face(*key, pitch) for key, rectangle in rectangles.items()]
 
 
 def tangents(points: NDArray[np.float64], axis: int, sign: int) -> NDArray[np.float64]:
@@ -188,59 +212,115 @@ def _pyramid(axis: int, sign: int) -> NDArray[np.float64]:
     return normals
 
 
-def _single_face(points: NDArray[np.float64], limit: float) -> tuple[int, int] | None:
-    """The direction in which all points lie in front with the smallest largest tangent, if below `limit`."""
-    best, best_tangent = None, limit
+def _single_face(
+    points: NDArray[np.float64], limit: float, previous: Sequence[Face]
+) -> tuple[int, int] | None:
+    """The direction in which all points lie in front with the smallest largest tangent, if below `limit`.
+
+    After one face, another must be better by a margin; after several, one must be good enough by a margin.
+    """
+    before = [(face.axis, face.sign) for face in previous]
+    if len(before) > 1:
+        limit = max(limit / _STAY, 1.0)
+    best, best_tangent = None, np.inf
     for axis in range(3):
         for sign in (-1, 1):
             t_i, t_j, distance = tangents(points, axis, sign).T
             if distance.min() > 0:
                 steepest = max(np.abs(t_i).max(), np.abs(t_j).max())
-                if steepest <= best_tangent:
-                    best, best_tangent = (axis, sign), steepest
+                if steepest <= limit:
+                    judged = steepest / _STAY if before == [(axis, sign)] else steepest
+                    if judged <= best_tangent:
+                        best, best_tangent = (axis, sign), judged
     return best
 
 
-def _face(
-    geometry: EyeGeometry,
-    axis: int,
-    sign: int,
-    points: NDArray[np.float64],
-    limit: float,
-    quality: float,
-    max_size: int,
-) -> Face:
-    """The face that holds the rays to `points`, as far as their tangents are below `limit`."""
-    points = points[points[:, axis] * sign > 0]
-    t_i, t_j, distance = tangents(points, axis, sign).T
-    low = np.clip([t_i.min(), t_j.min()], -limit, limit)
-    high = np.clip([t_i.max(), t_j.max()], -limit, limit)
-    pitch = max(_volume_pitch(geometry, points, distance), _wall_pitch(geometry, axis, sign, limit)) / quality
-    margin = 2  # a pixel on each side, so that the warp's bilinear look-up finds what it needs
-    largest = (high - low).max()
-    # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made of
-    # its own margins. The half keeps pixel centres off the box's silhouette, where nobody can decide.
-    pitch = min(pitch, largest / (TILE - margin - 0.5) or pitch)
-    most = max_size // TILE * TILE
-    pitch = max(pitch, largest / (most - margin - 1))
-    width, height = (int(n) + margin for n in np.ceil((high - low) / pitch - 1e-9))
-    width = -(-width // TILE) * TILE
-    # Centred, so that a mirrored volume has the mirrored image.
-    origin = (low + high) / 2 - np.array([width, height]) / 2 * pitch
-    return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width, height))
+def _parts(polygons: list[NDArray[np.float64]]) -> dict[tuple[int, int], NDArray[np.float64]]:
+    """For each (axis, sign) that owns part of the polygons: the corners of that part."""
+    parts = {}
+    for axis in range(3):
+        for sign in (-1, 1):
+            own = [_clip(polygon, _pyramid(axis, sign)) for polygon in polygons]
+            own = [polygon for polygon in own if len(polygon)]
+            if own:
+                parts[axis, sign] = np.concatenate(own)
+    return parts
 
 
-def _volume_pitch(geometry: EyeGeometry, points: NDArray[np.float64], distance: NDArray[np.float64]) -> float:
+@dataclass(frozen=True, eq=False)
+class _Rectangle:
+    """The rectangle of tangents that a face must cover, and the points on the box that bound it."""
+
+    points: NDArray[np.float64]
+    distance: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, points: NDArray[np.float64], axis: int, sign: int, limit: float) -> _Rectangle:
+        points = points[points[:, axis] * sign > 0]
+        t_i, t_j, distance = tangents(points, axis, sign).T
+        low = np.clip([t_i.min(), t_j.min()], -limit, limit)
+        high = np.clip([t_i.max(), t_j.max()], -limit, limit)
+        return cls(points, distance, low, high)
+
+    @property
+    def longest(self) -> float:
+        return float((self.high - self.low).max())
+
+    def face(self, axis: int, sign: int, pitch: float) -> Face:
+        """The pixels that the warp's bilinear look-up needs, and some more for whole packets."""
+        first = np.floor(self.low / pitch - 0.5 - _GUARD)
+        width, height = (int(n) for n in np.ceil(self.high / pitch + 0.5 + _GUARD) - first)
+        extra = -width % TILE
+        outwards_left = (
+            2 * first[0] + width < 0
+        )  # where an odd pixel goes: a mirrored face is the mirror image
+        first[0] -= (extra + outwards_left) // 2
+        origin = first * pitch
+        return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width + extra, height))
+
+
+def _pitch(geometry: EyeGeometry, rectangle: _Rectangle, axis: int, sign: int, limit: float) -> float:
+    """The pitch that the volume and the walls ask of one face."""
+    return max(_volume_pitch(geometry, rectangle), _wall_pitch(geometry, axis, sign, limit))
+
+
+def _common_pitch(pitches: list[float], rectangles: list[_Rectangle]) -> float:
+    """One pitch for all faces with the work of each face's own: Σ area · depth / pitch² is the same."""
+    if len(pitches) == 1:
+        return pitches[0]
+    work = np.array([max(np.prod(r.high - r.low), 1e-6) * r.distance.max() for r in rectangles])
+    return float(np.sqrt(work.sum() / (work / np.square(pitches)).sum()))
+
+
+def _seam_pitch(
+    pitch: float, longest: float, previous: Sequence[Face], *, exact: bool, max_size: int
+) -> float:
+    """A pitch near `pitch` with pixel centres at tangents of ±1: 1 / (n + ½), n a multiple of 8 by choice.
+
+    Multiples of 8, and the previous frame's if it will do, because another pitch changes all of a picture a
+    little, and an eye that moves slowly should seldom meet one.
+    """
+    if exact:
+        return 1 / (int(1 / pitch - 0.5) + 0.5)
+    if len(previous) > 1 and 1 / _STAY < previous[0].pitch / pitch < _STAY:
+        pitch = previous[0].pitch
+    most = (max_size // TILE * TILE - _EXTRA) / longest - 0.5 if longest else np.inf
+    return 1 / (min(max(_STEP * round((1 / pitch - 0.5) / _STEP), _STEP), int(most)) + 0.5)
+
+
+def _volume_pitch(geometry: EyeGeometry, rectangle: _Rectangle) -> float:
     """One pixel a voxel on the nearest slice, but no finer than half a pixel a voxel on the farthest.
 
-    The nearest is where `points` on the box's sides begin; from inside it is the eye's own, or where the near
-    distance lets it begin.
+    The nearest is where the box begins; from inside it is the eye's own, or where the near distance lets it.
     """
+    distance = rectangle.distance
     front = 0.0 if geometry.inside else distance.min()
     if geometry.near:
-        world = np.linalg.norm(points @ np.linalg.inv(geometry.object_from_world).T, axis=-1)
+        world = np.linalg.norm(rectangle.points @ np.linalg.inv(geometry.object_from_world).T, axis=-1)
         front = max(front, geometry.near * (distance / world).min())
-    return 1 / max(front, distance.max() / 2)
+    return float(1 / max(front, distance.max() / 2))
 
 
 def _wall_pitch(geometry: EyeGeometry, axis: int, sign: int, limit: float) -> float:
