@@ -28,8 +28,6 @@ _TOUCHES = 1e-9
 _GUARD = 1e-6
 # A rectangle of n pitches takes up to n + 3 pixels, whatever its position against the pixels.
 _EXTRA = 3
-# With several faces, pixels from the middle of a face to its seam are a multiple of this.
-_STEP = 8
 # What a previous frame chose stays while nothing is better by this factor.
 _STAY = 1.1
 
@@ -130,7 +128,9 @@ def plan_faces(
     limit = np.inf if single is not None else 1.0
     rectangles = {key: _Rectangle.of(points, *key, limit) for key, points in parts.items()}
     longest = max(rectangle.longest for rectangle in rectangles.values())
+    most = max_size // TILE * TILE
     if intermediate_size:
+        most = min(most, -(-intermediate_size // TILE) * TILE)
         pitch = longest / (intermediate_size - _EXTRA) or 1.0
     else:
         pitches = [_pitch(geometry, rectangle, *key, limit) for key, rectangle in rectangles.items()]
@@ -138,10 +138,10 @@ def plan_faces(
         # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made
         # of its own margins.
         pitch = min(pitch, longest / (TILE - _EXTRA) or pitch)
-    pitch = max(pitch, longest / (max_size // TILE * TILE - _EXTRA))
+    pitch = max(pitch, longest / (most - _EXTRA))
     if single is None:
-        pitch = _seam_pitch(pitch, longest, previous, exact=bool(intermediate_size), max_size=max_size)
-    return [rectangle.face(*key, pitch) for key, rectangle in rectangles.items()]
+        pitch = _seam_pitch(pitch, longest, most, previous, exact=bool(intermediate_size))
+    return [rectangle.face(*key, pitch, most) for key, rectangle in rectangles.items()]
 
 
 def tangents(points: NDArray[np.float64], axis: int, sign: int) -> NDArray[np.float64]:
@@ -268,17 +268,26 @@ class _Rectangle:
     def longest(self) -> float:
         return float((self.high - self.low).max())
 
-    def face(self, axis: int, sign: int, pitch: float) -> Face:
-        """The pixels that the warp's bilinear look-up needs, and some more for whole packets."""
+    def face(self, axis: int, sign: int, pitch: float, most: int) -> Face:
+        """The pixels that the warp's bilinear look-up needs, in whole packets, at most `most` in a row.
+
+        Packets begin at multiples of 16 pixels from the tangent 0, where there is room, so that a pixel stays
+        in its packet, whose steepest ray decides how many samples it takes, when the rectangle grows.
+        """
         first = np.floor(self.low / pitch - 0.5 - _GUARD)
-        width, height = (int(n) for n in np.ceil(self.high / pitch + 0.5 + _GUARD) - first)
-        extra = -width % TILE
-        outwards_left = (
-            2 * first[0] + width < 0
-        )  # where an odd pixel goes: a mirrored face is the mirror image
-        first[0] -= (extra + outwards_left) // 2
-        origin = first * pitch
-        return Face(axis, sign, (float(origin[0]), float(origin[1])), float(pitch), (width + extra, height))
+        end = np.ceil(self.high / pitch + 0.5 + _GUARD)
+        begin = first[0] // TILE * TILE
+        width = -(-end[0] // TILE) * TILE - begin
+        if width > most:
+            begin = first[0]
+            width = -(-(end[0] - begin) // TILE) * TILE
+        return Face(
+            axis,
+            sign,
+            (float(begin * pitch), float(first[1] * pitch)),
+            float(pitch),
+            (int(width), int(end[1] - first[1])),
+        )
 
 
 def _pitch(geometry: EyeGeometry, rectangle: _Rectangle, axis: int, sign: int, limit: float) -> float:
@@ -294,20 +303,20 @@ def _common_pitch(pitches: list[float], rectangles: list[_Rectangle]) -> float:
     return float(np.sqrt(work.sum() / (work / np.square(pitches)).sum()))
 
 
-def _seam_pitch(
-    pitch: float, longest: float, previous: Sequence[Face], *, exact: bool, max_size: int
-) -> float:
-    """A pitch near `pitch` with pixel centres at tangents of ±1: 1 / (n + ½), n a multiple of 8 by choice.
+def _seam_pitch(pitch: float, longest: float, most: int, previous: Sequence[Face], *, exact: bool) -> float:
+    """A pitch near `pitch` with pixel centres at tangents of ±1: 1 / (n + ½), n = 14, 30, 46 … by choice.
 
-    Multiples of 8, and the previous frame's if it will do, because another pitch changes all of a picture a
-    little, and an eye that moves slowly should seldom meet one.
+    Then a whole face, |t| ≤ 1 and an apron, fills its packets. Such steps, and the previous frame's pitch if
+    it will do, because another pitch changes all of a picture a little, and an eye that moves slowly should
+    seldom meet one.
     """
     if exact:
         return 1 / (int(1 / pitch - 0.5) + 0.5)
     if len(previous) > 1 and 1 / _STAY < previous[0].pitch / pitch < _STAY:
         pitch = previous[0].pitch
-    most = (max_size // TILE * TILE - _EXTRA) / longest - 0.5 if longest else np.inf
-    return 1 / (min(max(_STEP * round((1 / pitch - 0.5) / _STEP), _STEP), int(most)) + 0.5)
+    packets = max(round((1 / pitch + 1.5) / TILE), 1)
+    largest = (most - _EXTRA) / longest - 0.5 if longest else np.inf
+    return 1 / (min(TILE * packets - 2, int(largest)) + 0.5)
 
 
 def _volume_pitch(geometry: EyeGeometry, rectangle: _Rectangle) -> float:
