@@ -44,12 +44,12 @@ def composite_eye(
     volume = store.volume
     pose = volume.world_from_object
     object_from_world = np.linalg.inv(pose)
-    eye_object = object_from_world[:3, :3] @ eye.position + object_from_world[:3, 3]
-    parts, low, high = _seen_parts(store, regions, eye_object)
+    eye_object = object_from_world[:3] @ (*eye.position, eye.w)
+    parts, low, high = _seen_parts(store, regions, eye_object, eye.w)
     faces: list[Face] = []
     if parts:
         views = [View(eye, wall) for wall in walls]
-        geometry = EyeGeometry(eye_object, low, high, views, object_from_world[:3, :3], eye.near)
+        geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
         faces = plan_faces(
             geometry,
             quality=settings.quality,
@@ -72,10 +72,10 @@ def composite_eye(
 
 
 def _seen_parts(
-    store: RunStore, regions: Regions, eye_object: NDArray[np.float64]
+    store: RunStore, regions: Regions, eye_object: NDArray[np.float64], w: float
 ) -> tuple[list[Part], NDArray[np.float64], NDArray[np.float64]]:
     """The parts that are neither hidden nor transparent, front to back, and the object-space box of them."""
-    parts = shown_parts(regions, store.volume, np.append(eye_object, 1.0))
+    parts = shown_parts(regions, store.volume, np.append(eye_object, w))
     visible = store.visible_box() if parts else None
     low, high = visible or (np.full(3, np.inf), np.full(3, -np.inf))
     parts = [part for part in parts if (part.low <= high).all() and (part.high >= low).all()]
@@ -113,10 +113,12 @@ def _composite(
     per_interval = face.samples_per_interval(least)
     runs = store.axis(face.axis, pairs=per_interval > 1)
     low, high = part.low[axes], part.high[axes]
-    standard_eye = eye_object[axes]
-    base = max(face.sign * ((low if face.sign > 0 else high)[2] - standard_eye[2]), 0.0)
-    e_i, e_j, e_k = standard_eye
-    geometry = np.array([e_i, e_j, 0.0, *face.origin, face.pitch, e_k, face.sign, base, least, eye.near])
+    (o_i, o_j), offset_pitch, (t_i, t_j), pitch, k_0 = face.rays(eye_object[axes])
+    if eye.is_at_infinity and face.sign < 0:  # distances count from the front slice
+        last = runs.size[2] - 1.0
+        o_i, o_j, k_0 = o_i - t_i * (last - k_0), o_j - t_j * (last - k_0), last
+    base = max(face.sign * ((low if face.sign > 0 else high)[2] - k_0), 0.0)
+    geometry = np.array([o_i, o_j, offset_pitch, t_i, t_j, pitch, k_0, face.sign, base, least, eye.near])
     half_spaces = part.half_spaces[:, [*axes, 3]]
     samples = np.zeros(out.shape[0], np.int64)
     _jit.set_threads(threads)

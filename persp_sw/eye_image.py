@@ -54,21 +54,26 @@ class EyeImage:
         """(3, 3): world direction of the ray (t_i, t_j, 1) of face `number`; the ray starts at the eye.
 
         A quad with its corners at eye + world_from_tangents · (t_i, t_j, 1)·D shows the face, for any D > 0.
+        For an eye at infinity: world position on slice k = 0 of (i, j, 1); those are the quad's corners.
         """
         face = self.faces[number]
+        if face.parallel is not None:
+            i, j, _ = STANDARD_AXES[face.axis]
+            return self.world_from_object[:3, [i, j, 3]]
         matrix = self.world_from_object[:3, list(STANDARD_AXES[face.axis])].copy()
         matrix[:, 2] *= face.sign
         return matrix
 
     def to_bytes(self) -> bytes:
         """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""
-        table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size) for f in self.faces]
+        nowhere = (np.nan, np.nan)
+        table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size, *(f.parallel or nowhere)) for f in self.faces]
         buffer = io.BytesIO()
         np.savez(
             buffer,
-            eye=np.array([*self.eye.position, self.eye.near]),
+            eye=np.array([*self.eye.position, self.eye.near, self.eye.w]),
             world_from_object=self.world_from_object,
-            faces=np.array(table, np.float64).reshape(-1, 7),
+            faces=np.array(table, np.float64).reshape(-1, 9),
             pixels=self.pixels,
             samples=np.int64(self.samples),
         )
@@ -83,13 +88,16 @@ class EyeImage:
                 content = {name: file[name] for name in names}
             shapes = {name: array.shape for name, array in content.items()}
             pixels = content["pixels"]
-            fits = shapes["eye"] == (4,) and shapes["world_from_object"] == (4, 4) and shapes["samples"] == ()
+            fits = shapes["eye"] == (5,) and shapes["world_from_object"] == (4, 4) and shapes["samples"] == ()
             if not (fits and pixels.ndim == 2 and pixels.shape[1] == 4 and pixels.dtype == np.float32):
                 raise ValueError(f"its arrays have the shapes {shapes}")
             faces = tuple(_face(*row) for row in content["faces"].tolist())
-            *position, near = content["eye"].tolist()
+            *position, near, w = content["eye"].tolist()
             samples = int(content["samples"])
-            image = cls(Eye(position, near), content["world_from_object"], faces, pixels, samples)
+            eye = Eye(position, near, w)
+            if any((face.parallel is not None) != eye.is_at_infinity for face in faces):
+                raise ValueError("its faces are another eye's")
+            image = cls(eye, content["world_from_object"], faces, pixels, samples)
         except (OSError, EOFError, ValueError, TypeError, KeyError, OverflowError, BadZipFile) as error:
             raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
         if image.offset(len(faces)) != len(pixels):
@@ -97,10 +105,9 @@ class EyeImage:
         return image
 
 
-def _face(
-    axis: float, sign: float, t_i: float, t_j: float, pitch: float, width: float, height: float
-) -> Face:
+def _face(axis, sign, t_i, t_j, pitch, width, height, parallel_i, parallel_j) -> Face:
     numbers = axis in (0, 1, 2) and sign in (-1, 1) and 0 < pitch < np.inf and width >= 2 and height >= 2
-    if not numbers or not np.isfinite([t_i, t_j, width, height]).all():
+    parallel = None if np.isnan(parallel_i) else (parallel_i, parallel_j)
+    if not numbers or not np.isfinite([t_i, t_j, width, height, *(parallel or ())]).all():
         raise ValueError("a face of it is impossible")
-    return Face(int(axis), int(sign), (t_i, t_j), pitch, (int(width), int(height)))
+    return Face(int(axis), int(sign), (t_i, t_j), pitch, (int(width), int(height)), parallel)

@@ -160,7 +160,8 @@ def _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
     transfer = transfer.with_unit(min(volume.spacing))
     table = _pieces_of(transfer)
     object_from_world = np.linalg.inv(volume.world_from_object)
-    eye = object_from_world[:3, :3] @ view.eye.position + object_from_world[:3, 3]
+    starts = view.starts() @ object_from_world[:3, :3].T + object_from_world[:3, 3]
+    near = -np.inf if view.eye.is_at_infinity else float(view.eye.near)
     world_directions = view.directions()
     world_directions /= np.linalg.norm(world_directions, axis=-1, keepdims=True)
     directions = world_directions @ object_from_world[:3, :3].T  # objects' units a world unit along the ray
@@ -171,9 +172,9 @@ def _cast_in_bands(volume, transfer, view, regions, tolerance, states, progress)
         last = min(first + rows, height)
         _cast_band(
             data,
-            eye,
+            starts[first:last].reshape(-1, 3),
             directions[first:last].reshape(-1, 3),
-            float(view.eye.near),
+            near,
             planes,
             kinds,
             regions.crop_flags,
@@ -256,9 +257,9 @@ def _pieces_of(transfer: TransferFunction):
 
 
 @parallel_kernel
-def _cast_band(data, eye, directions, near, planes, kinds, crop_flags, table, unit, tolerance, states):
+def _cast_band(data, starts, directions, near, planes, kinds, crop_flags, table, unit, tolerance, states):
     for pixel in prange(len(directions)):
-        direction, state = directions[pixel], states[pixel]
+        eye, direction, state = starts[pixel], directions[pixel], states[pixel]
         ends = np.empty(len(planes) + 2)
         count = _cut_ray(eye, direction, near, planes, kinds, ends)
         piece_tolerance = tolerance / 32

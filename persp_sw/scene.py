@@ -197,6 +197,7 @@ class Scene:
             centre=keys.centre,
             up=keys.up,
             fovy=keys.fovy,
+            parallel_height=keys.parallel_height,
             size=keys.size,
             eye_offset=index * np.array(keys.eye_step or (0.0, 0.0, 0.0)),
         )
@@ -249,6 +250,8 @@ class Scene:
             Regions(keys.crop, crop_flags=keys.crop_flags)
         except PerspSWError as error:
             problems.append(f"crop_flags: {error}")
+        if keys.fovy and keys.parallel_height:
+            problems.append("fovy: a parallel view has parallel_height instead; give one of the two")
         if keys.eye and keys.centre:
             for frame in sorted({0, keys.frames if keys.eye_step else 0}):
                 eye = np.array(keys.eye) + frame * np.array(keys.eye_step or (0, 0, 0))

@@ -64,6 +64,7 @@ class SceneKeys(BaseModel):
     centre: Vector3 | None = None
     up: Vector3 | None = None
     fovy: Annotated[Number, Field(gt=0, lt=180)] | None = None
+    parallel_height: Positive | None = None
     size: tuple[Annotated[Count, Field(ge=1, le=16384)], Annotated[Count, Field(ge=1, le=16384)]] = (512, 512)
     # How often and how finely.
     frames: Annotated[Count, Field(ge=1)] = 1

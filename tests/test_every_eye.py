@@ -9,7 +9,7 @@ from exact_faces import COLOUR, VALUE, assert_covered, assert_exact
 from tolerances import CONTINUOUS, INSIDE_SMOOTH_DB, SEAM
 from views import random_pose
 
-from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, load, reference
+from persp_sw import Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, load, reference
 from persp_sw.errors import SettingsError
 from persp_sw.measure.metrics import psnr
 from persp_sw.volume.phantoms import synthetic_ct

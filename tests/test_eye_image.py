@@ -71,10 +71,11 @@ def saved(**arrays):
     return buffer.getvalue()
 
 
+NOWHERE = np.nan  # tangents of parallel rays, where they are not
 GOOD = {
-    "eye": np.zeros(4),
+    "eye": np.array([0, 0, 0, 0, 1.0]),
     "world_from_object": np.eye(4),
-    "faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2]]),
+    "faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2, NOWHERE, NOWHERE]]),
     "pixels": np.zeros((4, 4), np.float32),
     "samples": np.int64(0),
 }
@@ -83,15 +84,19 @@ GOOD = {
 @pytest.mark.parametrize(
     "change",
     [
-        {"faces": np.zeros(7)},
-        {"faces": np.array([[3, 1, 0, 0, 0.1, 2, 2.0]])},
-        {"faces": np.array([[0, 1, np.inf, 0, 0.1, 2, 2.0]])},
-        {"faces": np.array([[0, 1, 0, 0, 0, 2, 2.0]])},
+        {"faces": np.zeros(9)},
+        {"faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2]])},
+        {"faces": np.array([[3, 1, 0, 0, 0.1, 2, 2.0, NOWHERE, NOWHERE]])},
+        {"faces": np.array([[0, 1, np.inf, 0, 0.1, 2, 2.0, NOWHERE, NOWHERE]])},
+        {"faces": np.array([[0, 1, 0, 0, 0, 2, 2.0, NOWHERE, NOWHERE]])},
+        {"faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2, 0.1, 0.2]])},
+        {"eye": np.array([0, 0, 1, 0, 0.0])},
+        {"eye": np.array([0, 0, 1, 0, 0.5])},
         {"pixels": np.zeros((4, 4))},
         {"pixels": np.zeros((4, 3), np.float32)},
         {"world_from_object": np.eye(3)},
         {"samples": np.zeros(2)},
-        {"eye": np.full(4, np.nan)},
+        {"eye": np.full(5, np.nan)},
     ],
 )
 def test_impossible_contents_are_refused(change):

@@ -11,7 +11,7 @@ from persp_sw.geometry.faces import EyeGeometry, plan_faces, tangents
 def geometry_of(volume, *views):
     inverse = np.linalg.inv(volume.world_from_object)
     eye = inverse[:3, :3] @ views[0].eye.position + inverse[:3, 3]
-    return EyeGeometry(eye, np.zeros(3), np.array(volume.size) - 1.0, views, inverse[:3, :3])
+    return EyeGeometry(eye, np.zeros(3), np.array(volume.size) - 1.0, views, inverse)
 
 
 def plan(geometry, quality=1.0, single=3.0, max_size=4096):
@@ -23,7 +23,7 @@ def empty_volume(size=(20, 30, 25), **pose):
 
 
 def rays_that_meet(geometry, view):
-    directions = view.directions().reshape(-1, 3) @ geometry.object_from_world.T
+    directions = view.directions().reshape(-1, 3) @ geometry.object_from_world[:3, :3].T
     with np.errstate(divide="ignore"):
         one, other = (geometry.low - geometry.eye) / directions, (geometry.high - geometry.eye) / directions
     near, far = np.minimum(one, other).max(1), np.maximum(one, other).min(1)

@@ -43,6 +43,13 @@ _VIEW_OPTIONS = [
     click.option("--centre", type=float, nargs=3, metavar="X Y Z", help="The point in the middle, world."),
     click.option("--up", type=float, nargs=3, metavar="X Y Z", help="What points upwards."),
     click.option("--fovy", type=float, metavar="DEGREES", help="Vertical opening angle."),
+    click.option(
+        "--parallel",
+        "parallel_height",
+        type=float,
+        metavar="H",
+        help="Parallel projection, H high in world.",
+    ),
     click.option("--background", type=float, nargs=3, metavar="R G B", help="Linear colour behind, 0 … 1."),
     click.option("--frames", type=int, metavar="N", help="Frames to time."),
 ]

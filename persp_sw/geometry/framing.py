@@ -28,6 +28,7 @@ def framed_view(
     centre: Vector | None = None,
     up: Vector | None = None,
     fovy: float | None = None,
+    parallel_height: float | None = None,
     size: Sequence[int] = (512, 512),
     eye_offset: Vector = (0.0, 0.0, 0.0),
 ) -> View:
@@ -45,6 +46,8 @@ def framed_view(
     fovy
         Full vertical angle, degrees. By default 30, or what shows the whole box (5 … 100) where `eye` is
         given.
+    parallel_height
+        World length that the picture's height shows in a parallel projection; it takes the place of `fovy`.
     size
         Width and height, pixels.
     eye_offset
@@ -78,7 +81,10 @@ def framed_view(
         depth = distance - z
         fovy = 100.0 if (depth <= 0).any() else float(2 * np.degrees(np.arctan(np.max(half / depth))))
         fovy = min(max(fovy, 5.0), 100.0)
-    return View.look_at(np.asarray(eye, np.float64) + eye_offset, centre, up, fovy, size)
+    eye = np.asarray(eye, np.float64) + eye_offset
+    if parallel_height is not None:
+        return View.parallel(eye, centre, up, parallel_height, size)
+    return View.look_at(eye, centre, up, fovy, size)
 
 
 def _corners(volume: Volume, regions: Regions | None) -> NDArray[np.float64]:

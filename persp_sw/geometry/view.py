@@ -12,22 +12,48 @@ from ..errors import ViewError
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """A point in the world from which rays start.
+    """A point in the world from which rays start, or a direction from which all of them come.
 
     Parameters
     ----------
     position
-        World xyz.
+        World xyz. For an eye at infinity the direction towards it; kept as a unit vector.
     near
-        Nothing nearer to the eye than this, measured along the ray in world units, is shown (≥ 0).
+        Nothing nearer to the eye than this, measured along the ray in world units, is shown (≥ 0). From
+        infinity everything is shown, and this is 0.
+    w
+        The fourth homogeneous coordinate: 1, or 0 for an eye at infinity, the parallel projection.
     """
 
     position: Vector
     near: float = 0.0
+    w: float = 1.0
 
     def __post_init__(self):
-        object.__setattr__(self, "position", vector(self.position, "the eye's position", ViewError))
-        object.__setattr__(self, "near", number(self.near, "the near distance", ViewError, 0))
+        position = vector(self.position, "the eye's position", ViewError)
+        near = number(self.near, "the near distance", ViewError, 0)
+        if self.w not in (0, 1):
+            raise ViewError(f"an eye's w is 1, or 0 for an eye at infinity; given {self.w!r}")
+        if self.w == 0:
+            if near:
+                raise ViewError(f"an eye at infinity has no near distance; given {near}: use a clip plane")
+            length = np.linalg.norm(position)
+            if length == 0:
+                raise ViewError("the direction towards an eye at infinity is not zero")
+            if abs(length - 1) > 1e-12:  # a unit vector keeps its bits
+                position = position / length
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "near", near)
+
+    @classmethod
+    def at_infinity(cls, towards: Vector) -> Eye:
+        """An eye infinitely far away in the world direction `towards`: all its rays run along −`towards`."""
+        return cls(towards, 0.0, 0.0)
+
+    @property
+    def is_at_infinity(self) -> bool:
+        """Whether all rays are parallel."""
+        return self.w == 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +113,8 @@ class View:
     ----------
     direction_from_pixel
         (3, 3): the world direction (not normalised) of the ray through pixel point (column, row, 1) starts at
-        the eye and reaches the wall at length 1. Linear in the pixel: this is the whole projection.
+        the eye and reaches the wall at length 1. Linear in the pixel: this is the whole projection. For an
+        eye at infinity, the rays' one unit direction; they pass the wall at `wall.world_from_pixel`.
     """
 
     eye: Eye
@@ -96,6 +123,8 @@ class View:
 
     def __post_init__(self):
         matrix = self.wall.world_from_pixel
+        if self.eye.is_at_infinity:
+            matrix[:, 2] = 0
         matrix[:, 2] -= self.eye.position
         scale = np.prod(np.linalg.norm(matrix, axis=0))
         if abs(np.linalg.det(matrix)) <= 1e-12 * scale:
@@ -103,6 +132,8 @@ class View:
                 f"the eye {self.eye.position.tolist()} lies in the plane of wall {self.wall.name!r}: "
                 "it sees the wall edge-on; move the eye off the wall"
             )
+        if self.eye.is_at_infinity:
+            matrix[:, :2] = 0
         object.__setattr__(self, "direction_from_pixel", matrix)
 
     @classmethod
@@ -136,29 +167,35 @@ class View:
         ViewError
             Eye and centre coincide, `up` is parallel to the line of sight, or a number out of range.
         """
-        position = vector(eye, "the eye's position", ViewError)
-        forward = vector(centre, "the view's centre", ViewError) - position
-        up = vector(up, "the up direction", ViewError)
         fovy_deg = number(fovy_deg, "fovy (degrees)", ViewError, 1e-6, 180 - 1e-6)
-        width, height = _checked_pixels(size)
-        distance = np.linalg.norm(forward)
-        if distance == 0:
-            raise ViewError(f"eye and centre are the same point {position.tolist()}; move one of them")
-        forward /= distance
-        right = np.cross(forward, up)
-        if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
-            raise ViewError(f"up {up.tolist()} is parallel to the line of sight; choose another up")
-        right /= np.linalg.norm(right)
-        up = np.cross(right, forward)
+        position, forward, distance, right, up = _line_of_sight(eye, centre, up)
         # The wall stands at the centre, so that its size and the scene's are alike whatever the unit.
         half_height = distance * np.tan(np.radians(fovy_deg) / 2)
-        half_width = half_height * width / height
-        middle = position + forward * distance
-        corner = [
-            middle + sx * half_width * right + sy * half_height * up
-            for sx, sy in ((-1, -1), (1, -1), (-1, 1))
-        ]
-        return cls(Eye(position, near), Wall(*corner, pixels=size))
+        wall = _upright_wall(position + forward * distance, right, up, half_height, size)
+        return cls(Eye(position, near), wall)
+
+    @classmethod
+    def parallel(cls, eye: Vector, centre: Vector, up: Vector, height: float, size: tuple[int, int]) -> View:
+        """A parallel view, as of a camera infinitely far away on the line from `centre` through `eye`.
+
+        Parameters
+        ----------
+        eye, centre, up
+            As for `look_at`; of the eye only the direction matters.
+        height
+            World length that the picture's height shows, > 0. Pixels are square.
+        size
+            Width and height of the picture in pixels.
+
+        Raises
+        ------
+        ViewError
+            As `look_at`.
+        """
+        height = number(height, "the height of a parallel view", ViewError, 1e-300)
+        position, forward, distance, right, up = _line_of_sight(eye, centre, up)
+        wall = _upright_wall(position + forward * distance, right, up, height / 2, size)
+        return cls(Eye.at_infinity(-forward), wall)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -170,8 +207,16 @@ class View:
         """(3, 4): world xyz1 to homogeneous pixel coordinates; w is > 0 in front of the eye.
 
         The point's ray meets the wall at (x / w, y / w); w grows linearly with the distance from the wall's
-        parallel plane through the eye and is 1 on the wall.
+        parallel plane through the eye and is 1 on the wall. For an eye at infinity it is 1 everywhere.
         """
+        if self.eye.is_at_infinity:
+            matrix = self.wall.world_from_pixel
+            corner = matrix[:, 2].copy()
+            matrix[:, 2] = self.eye.position
+            inverse = np.linalg.inv(matrix)
+            affine = np.column_stack([inverse, -inverse @ corner])
+            affine[2] = 0, 0, 0, 1
+            return affine
         inverse = np.linalg.inv(self.direction_from_pixel)
         return np.column_stack([inverse, -inverse @ self.eye.position])
 
@@ -184,7 +229,50 @@ class View:
             return np.where(w > 0, homogeneous[..., :2] / w, np.nan)
 
     def directions(self) -> Points:
-        """(height, width, 3) world directions of all pixel centres' rays, reaching the wall at length 1."""
+        """(height, width, 3) world directions of all pixel centres' rays, reaching the wall at length 1.
+
+        All the same unit vector for an eye at infinity.
+        """
+        return self._pixel_centres() @ self.direction_from_pixel.T
+
+    def starts(self) -> Points:
+        """(height, width, 3) world points on all pixel centres' rays: the eye, or on the wall from infinity.
+
+        From infinity, rays show what lies on either side of the wall.
+        """
+        if self.eye.is_at_infinity:
+            return self._pixel_centres() @ self.wall.world_from_pixel.T
+        return np.broadcast_to(self.eye.position, (*self.size[::-1], 3))
+
+    def _pixel_centres(self) -> Points:
         width, height = self.size
         column, row = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-        return np.stack([column, row, np.ones_like(row)], -1) @ self.direction_from_pixel.T
+        return np.stack([column, row, np.ones_like(row)], -1)
+
+
+def _line_of_sight(eye: Vector, centre: Vector, up: Vector) -> tuple[Points, Points, float, Points, Points]:
+    """The eye, the unit vector to the centre, its distance, and unit vectors to the right and up."""
+    position = vector(eye, "the eye's position", ViewError)
+    forward = vector(centre, "the view's centre", ViewError) - position
+    up = vector(up, "the up direction", ViewError)
+    distance = np.linalg.norm(forward)
+    if distance == 0:
+        raise ViewError(f"eye and centre are the same point {position.tolist()}; move one of them")
+    forward /= distance
+    right = np.cross(forward, up)
+    if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
+        raise ViewError(f"up {up.tolist()} is parallel to the line of sight; choose another up")
+    right /= np.linalg.norm(right)
+    return position, forward, float(distance), right, np.cross(right, forward)
+
+
+def _upright_wall(
+    middle: Points, right: Points, up: Points, half_height: float, size: tuple[int, int]
+) -> Wall:
+    """A wall of square pixels about `middle`."""
+    width, height = _checked_pixels(size)
+    half_width = half_height * width / height
+    corners = [
+        middle + sx * half_width * right + sy * half_height * up for sx, sy in ((-1, -1), (1, -1), (-1, 1))
+    ]
+    return Wall(*corners, pixels=size)

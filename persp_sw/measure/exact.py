@@ -26,19 +26,20 @@ def shown_part(volume: Volume, view: View, regions: Regions | None = None) -> tu
 
     Returns
     -------
-    Two (height, width) arrays of world distances from the eye, not below its near distance; equal where the
-    ray misses. ValueError where `regions` are not convex, for then one interval cannot tell.
+    Two (height, width) arrays of world distances from the eye, not below its near distance, or from the wall
+    where the eye is at infinity; equal where the ray misses. ValueError where `regions` are not convex, for
+    then one interval cannot tell.
     """
     regions = regions or Regions()
     if not regions.convex:
         raise ValueError("what these regions show is not convex: a ray may meet it several times")
     object_from_world = np.linalg.inv(volume.world_from_object)
-    eye = object_from_world @ np.append(view.eye.position, 1)
+    starts = view.starts() @ object_from_world[:3, :3].T + object_from_world[:3, 3]
     directions = _unit_directions(view) @ object_from_world[:3, :3].T
-    entry = np.full(directions.shape[:2], view.eye.near)
+    entry = np.full(directions.shape[:2], -np.inf if view.eye.is_at_infinity else view.eye.near)
     leave = np.full(directions.shape[:2], np.inf)
     for plane in regions.half_spaces(volume):
-        offset, slope = plane @ eye, directions @ plane[:3]
+        offset, slope = starts @ plane[:3] + plane[3], directions @ plane[:3]
         with np.errstate(divide="ignore", invalid="ignore"):
             crossing = -offset / slope
         entry = np.where(slope > 0, np.maximum(entry, crossing), entry)
