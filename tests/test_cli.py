@@ -301,3 +301,11 @@ def test_other_packages_add_commands(monkeypatch):
     assert "Turn round and round." in listing
     assert "(cannot be loaded: division by zero)" in listing
     assert run("spin").stdout == "spinning\n"
+
+
+@pytest.mark.parametrize("size", [48, 200])
+def test_the_eye_images_size_may_be_asked_for(scene_file, tmp_path, size):
+    values = result_of("render", scene_file, "-o", tmp_path / "a.png", "--intermediate", size)
+    assert size - 4 <= max(values["intermediate_size"]) <= -(-size // 16) * 16
+    message = fails("render", scene_file, "-o", tmp_path / "a.png", "--intermediate", 5000)
+    assert "intermediate_size lies between 16 and 4096" in message

@@ -2,15 +2,18 @@
 
 import numpy as np
 import pytest
-from tolerances import ROUNDING, WARP_LINEAR
+import twins
+from tolerances import PICTURE_SURFACE_DB, ROUNDING, WARP_LINEAR
 from views import DIRECTIONS, random_pose
 
-from persp_sw import Eye, EyeImage, Renderer, TransferFunction, View, Volume, Wall, reference
+from persp_sw import Eye, EyeImage, Regions, Renderer, TransferFunction, View, Volume, Wall, reference
 from persp_sw.errors import SceneError, ViewError
 from persp_sw.geometry.faces import EyeGeometry, plan_faces
 from persp_sw.measure.exact import Slab
+from persp_sw.measure.metrics import psnr
+from persp_sw.optics.classification import Classification
 from persp_sw.scene import Scene
-from persp_sw.volume.levels import STANDARD_AXES
+from persp_sw.volume.levels import STANDARD_AXES, standard_rows
 from persp_sw.warp.software import warp_eye_image
 
 GOOD = {"eye": (0, 0, 5), "centre": (0, 0, 0), "up": (0, 1, 0), "height": 3, "size": (10, 8)}
@@ -140,7 +143,7 @@ def test_a_pixel_is_a_voxel_or_the_walls():
     assert plan(volume, magnified)[0].pitch == 1
     assert plan(volume, magnified, quality=2)[0].pitch == 0.5
     assert plan(volume, minified)[0].pitch == pytest.approx(1.2 * 128 / 2 / 20)
-    aside = View.parallel((0, 0, 1), (1000, 0, 0), (0, 1, 0), 9, (8, 8))
+    aside = View.parallel((1000, 0, 1), (1000, 0, 0), (0, 1, 0), 9, (8, 8))
     assert plan(volume, aside) == []
 
 
@@ -189,6 +192,40 @@ def test_every_pixel_looks_up_its_own_ray(rng):
             other = EyeImage.from_bytes(image.to_bytes())
             assert other.faces == image.faces and other.eye.is_at_infinity
             np.testing.assert_array_equal(other.eye.position, image.eye.position)
+
+
+@pytest.mark.parametrize("towards", DIRECTIONS[:4])
+def test_compositing_along_the_faces_rays_meets_the_reference(towards):
+    """The kernel's plain twin, ray by ray along `Face.rays`, then the warp."""
+    z, y, x = np.indices((9, 10, 11))
+    data = 120 + 100 * np.sin(0.5 * x + 0.2) * np.cos(0.4 * y - 0.3) * np.sin(0.3 * z + 0.7)
+    volume = Volume(data.astype(np.float32), (1, 1.2, 0.8))
+    transfer = TransferFunction([(0, (0.2, 0.4, 0.9), 0), (255, (1, 0.7, 0.4), 0.2)], 1.0)
+    classification = Classification.of(transfer, volume)
+    view = parallel_view(volume, towards, size=(20, 15))
+    image = eye_image(volume, view)
+    (face,) = image.faces
+    axes = list(STANDARD_AXES[face.axis])
+    offset, offset_pitch, tangents, _, k_0 = face.rays(np.full(3, np.nan))
+    linear = volume.world_from_object[:3, axes]
+    high = np.array(volume.size)[axes] - 1.0
+    pixels = image.face_pixels(0)
+    for v, u in np.ndindex(pixels.shape[:2]):
+        start = np.array(offset) + (np.array([u, v]) + 0.5) * offset_pitch
+        pixels[v, u] = twins.composite_pixel(
+            standard_rows(volume, face.axis),
+            (*start, k_0, face.sign, *tangents, -np.inf),
+            np.column_stack([np.zeros(3), high]).ravel(),
+            Regions().half_spaces(volume)[:, [*axes, 3]],
+            linear.T @ linear,
+            4,
+            classification.table,
+            classification.origin,
+            classification.scale,
+            0,
+        )
+    truth = reference.render(volume, transfer, view)
+    assert psnr(warp_eye_image(image, view), truth) > PICTURE_SURFACE_DB  # small: mostly silhouette
 
 
 # --- Reference, scenes and what is refused ----------------------------------------------------------------
