@@ -41,6 +41,7 @@ from .scanline import (
     ORIGIN_I,
     ORIGIN_J,
     PITCH,
+    ROUNDING,
     ROW,
     ROW_WEIGHT,
     SHARE,
@@ -175,7 +176,7 @@ def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
     last_cell = np.ceil(high) - 1.0
     step = planes[STEP, p]
     x_first = planes[CORNER, p] + (pixel + 0.5) * step
-    x_last = x_first + (n - 1) * step
+    x_last = x_first + (n - 1) * step + ROUNDING
     start = np.floor(min(max(x_first, low), last_cell))
     first = np.uint64(np.int64(start))
     end = np.uint64(np.int64(min(max(x_last, low), last_cell))) + _ONE

@@ -13,6 +13,7 @@ from .encode import WORD
 from .state import TILE
 
 STEEP = 1.5  # tangents beyond this take 2 samples in an interval, beyond twice this 4
+ROUNDING = 0.01  # voxels that float32 may place a pixel too far along i
 CHUNK = 64  # sample planes looked at together; a multiple of 8
 
 # `face`, see `composite.composite`.
@@ -201,7 +202,7 @@ def find_hits(pixel, count, stride_mask, beyond, chunk):
         low, high = planes[LOW, p], planes[HIGH, p]
         last_cell = np.ceil(high) - 1.0
         x_first = planes[CORNER, p] + centre * planes[STEP, p]
-        x_last = x_first + across * planes[STEP, p]
+        x_last = x_first + across * planes[STEP, p] + ROUNDING
         reached = (x_last >= low - beyond) & (x_first <= high + beyond)
         reached &= (np.int64(planes[NUMBER, p]) & stride_mask) == 0
         begin = np.uint64(np.int64(min(max(x_first, low), last_cell))) >> np.uint64(2)
