@@ -3,10 +3,21 @@
 import numpy as np
 import pytest
 import twins
-from tolerances import PICTURE_SURFACE_DB, ROUNDING, WARP_LINEAR
+from tolerances import CLOSED_FORM, PICTURE_SURFACE_DB, ROUNDING, WARP_LINEAR
 from views import DIRECTIONS, random_pose
 
-from persp_sw import Eye, EyeImage, Regions, Renderer, TransferFunction, View, Volume, Wall, reference
+from persp_sw import (
+    Eye,
+    EyeImage,
+    Regions,
+    Renderer,
+    Settings,
+    TransferFunction,
+    View,
+    Volume,
+    Wall,
+    reference,
+)
 from persp_sw.errors import SceneError, ViewError
 from persp_sw.geometry.faces import EyeGeometry, plan_faces
 from persp_sw.measure.exact import Slab
@@ -260,8 +271,49 @@ def test_scenes_may_be_parallel(tmp_path):
         Scene({**keys, "parallel_height": 0}, tmp_path)
 
 
-def test_compositing_from_infinity_is_refused_by_name():
-    volume = Volume(np.full((8, 8, 8), 200, np.uint8))
-    renderer = Renderer(volume, TransferFunction([(0, (1, 1, 1), 0.1)]))
-    with pytest.raises(ViewError, match="parallel projection"):
-        renderer.render(parallel_view(volume, DIRECTIONS[0]))
+# --- Composited ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", range(4))
+@pytest.mark.parametrize("samples", [1, 2])
+def test_a_homogeneous_box_seen_from_infinity_is_exact(kind, samples, rng):
+    slab = Slab(size=(9, 12, 7), pose=list(poses(rng))[kind], opacity=0.2)
+    settings = Settings(residual=0, samples_per_interval=samples)
+    for towards in DIRECTIONS:
+        view = parallel_view(slab.volume, towards)
+        image = Renderer(slab.volume, slab.transfer, settings).composite(view.eye, [view.wall])
+        (face,) = image.faces
+        pixels = image.face_pixels(0)
+        axes = list(STANDARD_AXES[face.axis])
+        direction = np.empty(3)
+        direction[axes] = *face.parallel, face.sign
+        world = slab.volume.world_from_object[:3, :3] @ direction
+        v, u = np.indices(pixels.shape[:2]) + 0.5
+        start = np.zeros((*v.shape, 3))
+        start[..., axes[0]] = face.origin[0] + u * face.pitch
+        start[..., axes[1]] = face.origin[1] + v * face.pitch
+        with np.errstate(divide="ignore", invalid="ignore"):
+            one, other = -start / direction, (np.array([8, 11, 6]) - start) / direction
+        way = np.minimum.reduce(np.maximum(one, other), -1) - np.maximum.reduce(np.minimum(one, other), -1)
+        way = np.maximum(way, 0) * np.linalg.norm(world)
+        alpha = -np.expm1(-slab.transfer.extinction(slab.volume.data[0, 0, 0]) * way)
+        assert alpha.max() > 0.3
+        assert np.abs(pixels[..., 3] - alpha).max() < CLOSED_FORM
+
+
+def test_a_picture_from_infinity_is_that_from_far_away():
+    """Not bit for bit: the pixels lie elsewhere. The volume is clear at its sides, so both converge."""
+    z, y, x = (np.linspace(-1, 1, n) for n in (20, 24, 28))
+    hill = (1 - x**2) * (1 - y[:, None] ** 2) * (1 - z[:, None, None] ** 2)
+    volume = Volume((200 * hill).astype(np.float32))
+    transfer = TransferFunction([(0, (0.2, 0.5, 1), 0), (200, (1, 0.8, 0.3), 0.2)], 1.0)
+    renderer = Renderer(volume, transfer, Settings(residual=0, quality=4))
+    centre = volume.centre
+    for towards in DIRECTIONS:
+        direction = np.array(towards) / np.linalg.norm(towards)
+        eye = centre + 1e6 * direction
+        up = np.roll(direction, 1) + (0.1, 0.2, 0.3)
+        height = 40.0
+        far = View.look_at(eye, centre, up, np.degrees(2 * np.arctan(height / 2e6)), (64, 64))
+        parallel = View.parallel(eye, centre, up, height, (64, 64))
+        assert psnr(renderer.render(parallel), renderer.render(far)) > 60
