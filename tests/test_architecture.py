@@ -50,7 +50,9 @@ REFERENCE_SEES = {
 # Package -> the only modules that may import it.
 RESERVED = {
     "numba": {"persp_sw._jit"},
-    "llvmlite": {"persp_sw._jit", "persp_sw.kernels.lanes", "persp_sw.kernels.packet_vector"},
+    "llvmlite": {
+        f"persp_sw.{name}" for name in ("_jit", "kernels.lanes", "kernels.packet_vector", "kernels.warp")
+    },
     "OpenGL": {"persp_sw.warp.texture", "persp_sw.warp.context", "vr_plugin.present"},
     "glfw": {"vr_plugin.window"},
     "imgui_bundle": {"vr_plugin.panel"},

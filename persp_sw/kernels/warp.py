@@ -1,85 +1,134 @@
-"""The software warp: faces of an eye image to the pixels of a view."""
+"""The software warp: faces of an eye image to the pixels of a view.
+
+A face's pixel coordinates are a projective function of the view's, (U, V, W) = H·(column, row, 1) and
+u = U/W, v = V/W. So along a row of the view everything that decides whether a face shows a pixel is linear in
+the column: what a face shows is one interval, and no pixel has to ask which face is its own.
+"""
 
 import numpy as np
+from llvmlite import ir
 
-from .._jit import kernel, parallel_kernel, prange
+from .._jit import intrinsic, kernel, parallel_kernel, prange, types
 
 _F = np.float32
+_CHUNK = 64  # pixels whose places are found together, as vectors
+_ONE = np.uint64(1)
 
-# Columns of `faces`, one row for each face.
-AXIS_I, AXIS_J, AXIS_K, SIGN, ORIGIN_I, ORIGIN_J, PITCH, WIDTH, HEIGHT, OFFSET = range(10)
-FACE_COLUMNS = 10
+
+@intrinsic
+def _look_up(_context, pixels, at, below, fraction_u, fraction_v, out, to):
+    """out[to] = pixels interpolated between at, at + 1, below and below + 1; four floats as one vector."""
+
+    def build(context, builder, signature, arguments):
+        pixel, word = ir.VectorType(ir.FloatType(), 4), ir.IntType(64)
+        source, target = (
+            builder.bitcast(
+                context.make_array(signature.args[n])(context, builder, arguments[n]).data, pixel.as_pointer()
+            )
+            for n in (0, 5)
+        )
+
+        def read(index, further):
+            address = builder.gep(source, [builder.add(index, ir.Constant(word, further))])
+            return builder.load(address, align=4)
+
+        def mix(one, other, share):
+            difference = builder.fsub(other, one, flags=("contract",))
+            return builder.fadd(
+                one, builder.fmul(share, difference, flags=("contract",)), flags=("contract",)
+            )
+
+        def everywhere(scalar):
+            first = builder.insert_element(
+                ir.Constant(pixel, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0)
+            )
+            return builder.shuffle_vector(
+                first, first, ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
+            )
+
+        across, down = everywhere(arguments[3]), everywhere(arguments[4])
+        above = mix(read(arguments[1], 0), read(arguments[1], 1), across)
+        under = mix(read(arguments[2], 0), read(arguments[2], 1), across)
+        builder.store(mix(above, under, down), builder.gep(target, [arguments[6]]), align=4)
+        return context.get_dummy_value()
+
+    arguments = (pixels, types.uint64, types.uint64, types.float32, types.float32, out, types.uint64)
+    return types.void(*arguments), build
 
 
 @kernel
-def _owner(x, y, z, face_of):
-    """The face that shows direction (x, y, z): −1 if none does."""
-    axis = 0
-    largest = abs(x)
-    along = x
-    if abs(y) > largest:
-        axis, largest, along = 1, abs(y), y
-    if abs(z) > largest:
-        axis, along = 2, z
-    return face_of[2 * axis + (1 if along > 0.0 else 0)]
+def _limit(constant, slope, interval):
+    """Narrow the interval [begin, end) of columns to those where constant + slope·(column + ½) ≥ 0.
+
+    Two faces that share a border ask with the same numbers and opposite signs: each pixel is one's.
+    """
+    if slope > 0.0:
+        interval[0] = max(interval[0], np.ceil(-constant / slope - 0.5))
+    elif slope < 0.0:
+        interval[1] = min(interval[1], np.ceil(constant / -slope - 0.5))
+    elif constant < 0.0:
+        interval[1] = -np.inf
 
 
 @parallel_kernel
-def warp(matrix, faces, face_of, pixels, window, out):
+def warp(face_from_view, borders, sizes, pixels, is_clear, out):
     """Look every pixel's ray up in the face that owns it, bilinearly; nothing outside the faces.
 
     Parameters
     ----------
-    matrix
-        float64 (3, 3): object-space direction of the ray through pixel point (column, row, 1).
-    faces
-        float64 (n, FACE_COLUMNS): object axes that are standard i, j and k; direction along k; tangents of
-        the image's corner; pitch; width, height and first pixel of the face in `pixels`.
-    face_of
-        int64 (6,): face for the rays whose largest component is along −x, +x, −y, +y, −z, +z; −1: none.
+    face_from_view
+        float64 (n, 3, 3): H of each face, to coordinates in which pixel centres are whole numbers.
+    borders
+        float64 (n, m, 3): a face shows the pixel points p = (column, row, 1) with b·p ≥ 0 for its m borders
+        b.
+    sizes
+        int64 (n, 3): width, height and first pixel in `pixels`.
     pixels
         float32 (total, 4): the faces' pixels, row by row.
-    window
-        int64 [first column, end column, first row, end row]: outside it, all is transparent.
+    is_clear
+        Whether `out` holds zeros already.
     out
         float32 (height, width, 4), overwritten.
     """
+    flat = out.reshape(-1)
     for row in prange(out.shape[0]):
-        if row < window[2] or row >= window[3]:
-            out[row] = _F(0.0)
-            continue
-        out[row, : window[0]] = _F(0.0)
-        out[row, window[1] :] = _F(0.0)
         y = row + 0.5
-        for column in range(window[0], window[1]):
-            x = column + 0.5
-            dx = matrix[0, 0] * x + matrix[0, 1] * y + matrix[0, 2]
-            dy = matrix[1, 0] * x + matrix[1, 1] * y + matrix[1, 2]
-            dz = matrix[2, 0] * x + matrix[2, 1] * y + matrix[2, 2]
-            for channel in range(4):
-                out[row, column, channel] = _F(0.0)
-            number = _owner(dx, dy, dz, face_of)
-            if number < 0:
-                continue
-            face = faces[number]
-            axis_i, axis_j, axis_k = face[AXIS_I], face[AXIS_J], face[AXIS_K]
-            along = face[SIGN] * (dx if axis_k == 0 else dy if axis_k == 1 else dz)
-            if along <= 0.0:
-                continue
-            across_i = dx if axis_i == 0 else dy if axis_i == 1 else dz
-            across_j = dx if axis_j == 0 else dy if axis_j == 1 else dz
-            u = (across_i / along - face[ORIGIN_I]) / face[PITCH] - 0.5
-            v = (across_j / along - face[ORIGIN_J]) / face[PITCH] - 0.5
-            width, height = np.int64(face[WIDTH]), np.int64(face[HEIGHT])
-            if not (u >= 0.0 and v >= 0.0 and u <= width - 1 and v <= height - 1):
-                continue
-            left, top = min(np.int64(u), width - 2), min(np.int64(v), height - 2)
-            fu, fv = _F(u - left), _F(v - top)
-            at = np.uint64(np.int64(face[OFFSET]) + top * width + left)
-            below = at + np.uint64(width)
-            for channel in range(4):
-                a = pixels[at, channel]
-                a += fu * (pixels[at + np.uint64(1), channel] - a)
-                b = pixels[below, channel]
-                b += fu * (pixels[below + np.uint64(1), channel] - b)
-                out[row, column, channel] = a + fv * (b - a)
+        interval = np.empty(2)
+        at, below = np.empty(_CHUNK, np.uint64), np.empty(_CHUNK, np.uint64)
+        across, down = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
+        alone = len(sizes) == 1
+        if not is_clear and not alone:
+            out[row] = _F(0.0)
+        for face in range(len(sizes)):
+            h, width, height = face_from_view[face], sizes[face, 0], sizes[face, 1]
+            u_0, v_0, w_0 = h[0, 1] * y + h[0, 2], h[1, 1] * y + h[1, 2], h[2, 1] * y + h[2, 2]
+            u_x, v_x, w_x = h[0, 0], h[1, 0], h[2, 0]
+            last_u, last_v = width - 1.0, height - 1.0
+            interval[0], interval[1] = 0.0, np.float64(out.shape[1])
+            for n in range(borders.shape[1]):
+                b = borders[face, n]
+                _limit(b[1] * y + b[2], b[0], interval)
+            _limit(w_0, w_x, interval)
+            _limit(u_0, u_x, interval)
+            _limit(v_0, v_x, interval)
+            _limit(last_u * w_0 - u_0, last_u * w_x - u_x, interval)
+            _limit(last_v * w_0 - v_0, last_v * w_x - v_x, interval)
+            begin = np.int64(min(interval[0], np.float64(out.shape[1])))
+            end = max(np.int64(max(interval[1], 0.0)), begin)
+            if not is_clear and alone:
+                out[row, :begin] = _F(0.0)
+                out[row, end:] = _F(0.0)
+            for first in range(begin, end, _CHUNK):
+                count = min(end - first, _CHUNK)
+                for n in range(np.uint64(count)):
+                    x = np.float64(first + np.int64(n)) + 0.5
+                    scale = 1.0 / (w_0 + w_x * x)
+                    u = min(max((u_0 + u_x * x) * scale, 0.0), last_u)
+                    v = min(max((v_0 + v_x * x) * scale, 0.0), last_v)
+                    left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
+                    across[n], down[n] = _F(u - left), _F(v - top)
+                    start = np.uint64(sizes[face, 2] + np.int64(top) * width + np.int64(left))
+                    at[n], below[n] = start, start + np.uint64(width)
+                to = np.uint64(row * out.shape[1] + first)
+                for n in range(np.uint64(count)):
+                    _look_up(pixels, at[n], below[n], across[n], down[n], flat, to + n)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .. import _jit
-from ..arrays import Image
+from ..arrays import Image, Matrix
 from ..eye_image import EyeImage
+from ..geometry.faces import Face
 from ..geometry.parallel import Shear
 from ..geometry.view import View
-from ..kernels.warp import FACE_COLUMNS, warp
+from ..kernels.warp import warp
 from ..volume.levels import STANDARD_AXES
 
 
@@ -20,54 +22,60 @@ def warp_eye_image(
 
     Returns
     -------
-    (height, width, 4) float32, linear, premultiplied, row 0 on top, no background; `out` if given.
+    (height, width, 4) float32, linear, premultiplied, row 0 on top, no background; `out` if given. A loop
+    that gives its own `out` saves the system's clearing new memory: a third of the time at 1024².
 
     Accuracy: the look-up is bilinear; which ray a pixel looks up is exact to float64 for the eye that the
     image was composited for, whatever the pose.
     """
     width, height = view.size
+    is_clear = out is None
     if out is None:
-        out = np.empty((height, width, 4), np.float32)
+        out = np.zeros((height, width, 4), np.float32)
     if not eye_image.faces:
         out[:] = 0
         return out
     object_from_world = np.linalg.inv(eye_image.world_from_object)
-    matrix = object_from_world[:3, :3] @ view.direction_from_pixel
-    faces = np.empty((len(eye_image.faces), FACE_COLUMNS))
-    face_of = np.full(6, -1, np.int64)
-    for number, face in enumerate(eye_image.faces):
-        axes, sign = STANDARD_AXES[face.axis], face.sign
-        if face.parallel is not None:  # the "direction" of a pixel is (i, j, 1) on slice k = 0
-            shear = Shear(face.axis, face.sign, face.parallel)
-            matrix, axes, sign = shear.plane_from_pixel(object_from_world, view), (0, 1, 2), 1
-        faces[number] = *axes, sign, *face.origin, face.pitch, *face.size, eye_image.offset(number)
-        face_of[2 * face.axis + (face.sign > 0)] = number
-    if len(eye_image.faces) == 1:
-        face_of[:] = 0  # a single face shows all rays
+    faces = eye_image.faces
     _jit.set_threads(threads or _jit.max_threads())
     warp(
-        np.ascontiguousarray(matrix),
-        faces,
-        face_of,
+        np.array([_face_from_view(face, object_from_world, view) for face in faces]),
+        np.array([_borders(face, len(faces), object_from_world, view) for face in faces]),
+        np.array([(*face.size, eye_image.offset(number)) for number, face in enumerate(faces)]),
         eye_image.pixels,
-        _window(eye_image, view),
+        is_clear,
         out,
     )
     return out
 
 
-def _window(eye_image: EyeImage, view: View) -> np.ndarray:
-    """Columns and rows [begin, end, begin, end] outside of which the faces show nothing."""
-    width, height = view.size
-    corners = []
-    for number, face in enumerate(eye_image.faces):
-        (t_i, t_j), (w, h), pitch = face.origin, face.size, face.pitch
-        tangents = [(t_i + u * w * pitch, t_j + v * h * pitch, 1.0) for u in (0, 1) for v in (0, 1)]
-        corners.append(np.array(tangents) @ eye_image.world_from_tangents(number).T)
-    at = view.project(np.concatenate(corners) + view.eye.w * view.eye.position)
-    if not np.isfinite(at).all():  # part of a face lies beside or behind the eye
-        return np.array([0, width, 0, height])
-    low, high = np.floor(at.min(0)), np.ceil(at.max(0))
-    size = np.array(view.size)
-    low, high = np.clip(low, 0, size).astype(np.int64), np.clip(high, 0, size).astype(np.int64)
-    return np.array([low[0], high[0], low[1], high[1]])
+def _face_from_view(face: Face, object_from_world: Matrix, view: View) -> Matrix:
+    """(3, 3): pixel point (column, row, 1) of the view to (u, v, 1) of the face up to a positive factor.
+
+    Pixel centres of the face are whole numbers.
+    """
+    if face.parallel is not None:
+        shear = Shear(face.axis, face.sign, face.parallel)
+        tangents = shear.plane_from_pixel(object_from_world, view)
+    else:
+        direction = object_from_world[:3, :3] @ view.direction_from_pixel
+        tangents = direction[list(STANDARD_AXES[face.axis])]
+        tangents[2] *= face.sign
+    (t_i, t_j), pitch = face.origin, face.pitch
+    pixel_from_tangents = np.array(
+        [[1 / pitch, 0, -t_i / pitch - 0.5], [0, 1 / pitch, -t_j / pitch - 0.5], [0, 0, 1]]
+    )
+    return pixel_from_tangents @ tangents
+
+
+def _borders(face: Face, count: int, object_from_world: Matrix, view: View) -> NDArray[np.float64]:
+    """(m, 3): the face shows pixel points p with b·p ≥ 0; a single face shows all rays it holds.
+
+    Of several each shows the rays whose largest component is its own.
+    """
+    if count == 1:
+        return np.empty((0, 3))
+    direction = object_from_world[:3, :3] @ view.direction_from_pixel
+    i, j, k = STANDARD_AXES[face.axis]
+    along = face.sign * direction[k]
+    return np.array([along - direction[i], along + direction[i], along - direction[j], along + direction[j]])
