@@ -86,3 +86,13 @@ SEAM = 1e-4
 # Nearest entry, at most 1/16 of a grey level off; the steepest slope in the test is 0.3 / 70 in opacity,
 # which is below 0.0061 in extinction: 0.0061 / 16 = 3.9e-4.
 TABLE = 4e-4
+
+# --- Levels of detail -------------------------------------------------------------------------------------
+
+# A coarse voxel is a float32 sum of up to 45 products (3 · 3 rows, 5 taps) of weights that sum to 1, relative
+# to the largest value: 6e-8 each, mostly cancelling.
+LEVEL = 1e-6
+
+# Rounding to integers errs by 1/√12 in each voxel, independently: standard deviations of a mean of them
+# allowed for; random values, so one in 2 million tests would fail.
+LEVEL_ROUNDING_DEVIATIONS = 5

@@ -67,6 +67,40 @@ def bits(words, blocks):
     return (words[..., m // WORD] >> (m % WORD).astype(np.uint64)) & np.uint64(1) != 0
 
 
+def halving(n, far):
+    """[coarse, n] weights of one axis of n voxels whose box ends at `far`, from what they must do.
+
+    A coarse voxel is the mean of the interpolant over [2m − 1, 2m + 1] in the box; the last is what makes the
+    mean over the box right.
+    """
+
+    def integral(values, begin, end):
+        """∫ of the linear interpolant of the values: it is linear between the knots."""
+        knots = np.unique(np.clip([begin, *range(len(values)), end], begin, end))
+        at = np.interp(knots, range(len(values)), values)
+        return ((at[1:] + at[:-1]) / 2 * np.diff(knots)).sum()
+
+    count = int(np.ceil(far / 2)) + 1
+    weights = np.zeros((count, n))
+    for voxel, unit in enumerate(np.eye(n)):
+        for m in range(count - 1):
+            begin, end = max(2 * m - 1, 0), min(2 * m + 1, far)
+            weights[m, voxel] = integral(unit, begin, end) / (end - begin)
+        without_last = 2 * integral(weights[:, voxel], 0, far / 2)
+        of_last = 2 * integral(np.eye(count)[-1], 0, far / 2)
+        weights[-1, voxel] = (integral(unit, 0, far) - without_last) / of_last
+    return weights
+
+
+def coarsen(data, weights):
+    """Weighted means [z, y, x], NaN left out; `weights` for x, y, z, each [coarse, fine]."""
+    there = ~np.isnan(data)
+    x, y, z = weights
+    means = np.einsum("Zz,Yy,Xx,zyx->ZYX", z, y, x, np.where(there, data, 0.0), optimize=True)
+    shares = np.einsum("Zz,Yy,Xx,zyx->ZYX", z, y, x, there.astype(float), optimize=True)
+    return np.divide(means, shares, out=np.full(means.shape, np.nan), where=shares > 1e-12)
+
+
 def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale, residual):
     """One pixel of a face, float64: `face` = (eye i j k, sign, t_i, t_j, near). rows [j, k, i]."""
     e, sign, t, near_world = np.array(face[:3]), face[3], np.array(face[4:6]), face[6]
