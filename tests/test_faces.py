@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+import twins
 from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import View, Volume, Wall
-from persp_sw.geometry.faces import EyeGeometry, plan_faces, tangents
+from persp_sw.geometry.faces import EyeGeometry, plan_faces
+from persp_sw.geometry.sight import Sights, tangents
 
 
 def geometry_of(volume, *views):
@@ -161,3 +163,80 @@ def test_a_grazing_wall_does_not_drive_the_pitch():
     grazing = Wall((-1000, -30, 35), (1000, -30, -100), (-1000, 60, 35), (64, 64))
     (face,) = plan(geometry_of(volume, View.through_wall(eye, grazing)))
     assert max(face.size) <= 64
+
+
+# --- The kernels' plain twins -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("distance", [0.2, 0.45, 0.8, 2])
+def test_what_is_seen_equals_the_plain_twin(distance, rng):
+    """Bounds of all that is seen and of each pyramid's own, from eyes inside and outside."""
+    compared = 0
+    for towards in DIRECTIONS:
+        volume = empty_volume(world_from_object=random_pose(rng, spacing=(1, 2, 0.5)))
+        views = [view_of(volume, towards, distance, fovy, size=(40, 30)) for fovy in (30, 110)]
+        geometry = geometry_of(volume, *views)
+        sights = Sights.of(geometry)
+        sides = sights_sides(geometry)
+        parts = [p for m in sights.matrices for p in twins.seen_corners(sides, m, (40, 30))]
+        for direction in range(6):
+            axis, sign = direction // 2, 1 if direction % 2 else -1
+            own = [twins.clip_polygon(p, twins.pyramid_normals(axis, sign)) for p in parts]
+            for sight, polygons in ((sights.whole(direction), parts), (sights.own(direction), own)):
+                points = np.concatenate([np.empty((0, 3)), *polygons])
+                t = tangents(points, axis, sign)
+                before = t[:, 2] > 0
+                assert (sight is None) == (not before.any())
+                if sight is None:
+                    continue
+                compared += 1
+                np.testing.assert_allclose(sight.low, t[before, :2].min(0), rtol=1e-9, atol=1e-9)
+                np.testing.assert_allclose(sight.high, t[before, :2].max(0), rtol=1e-9, atol=1e-9)
+                np.testing.assert_allclose(
+                    (sight.nearest, sight.farthest), (t[:, 2].min(), t[:, 2].max()), atol=1e-9
+                )
+                world = np.linalg.norm(points @ volume.world_from_object[:3, :3].T, axis=1)
+                np.testing.assert_allclose(sight.steepest, (world / t[:, 2])[before].max(), rtol=1e-9)
+    assert compared > 20
+
+
+def sights_sides(geometry):
+    """The box's sides relative to the eye, corner by corner."""
+    ends = np.array([geometry.low, geometry.high]) - geometry.eye
+    sides = []
+    for axis in range(3):
+        u, v = (axis + 1) % 3, (axis + 2) % 3
+        for end in (0, 1):
+            side = np.empty((4, 3))
+            side[:, axis] = ends[end, axis]
+            side[:, u], side[:, v] = ends[[0, 1, 1, 0], u], ends[[0, 0, 1, 1], v]
+            sides.append(side)
+    return sides
+
+
+@pytest.mark.parametrize("distance", [0.3, 0.8, 2])
+def test_pixel_sizes_equal_the_plain_twin(distance, rng):
+    volume = empty_volume(world_from_object=random_pose(rng, spacing=(1, 2, 0.5)))
+    for towards in DIRECTIONS[:4]:
+        view = view_of(volume, towards, distance, 80, size=(40, 30))
+        geometry = geometry_of(volume, view)
+        sights = Sights.of(geometry)
+        low, high = geometry.low - geometry.eye, geometry.high - geometry.eye
+        for only in (None, 2 * np.argmax(np.abs(towards)) + 1, 4):
+            sizes = sights.pixel_sizes(geometry, only)
+            for direction in range(6) if only is None else [only]:
+                axis, sign = direction // 2, 1 if direction % 2 else -1
+                expected = twins.pixel_sizes(
+                    sights.matrices[0], (40, 30), low, high, axis, sign, only is None, 24
+                )
+                if expected:
+                    np.testing.assert_allclose(sizes[direction], np.quantile(expected, 0.1), rtol=1e-3)
+
+
+def test_a_box_smaller_than_the_grid_has_a_pixel_size():
+    volume = empty_volume((3, 3, 3))
+    view = View.look_at((1.3, 1.1, 900), (1, 0, 1), (0, 1, 0), 30, (600, 600))
+    geometry = geometry_of(volume, view)
+    sizes = Sights.of(geometry).pixel_sizes(geometry, None)
+    assert sizes[4] == pytest.approx(2 * np.tan(np.radians(15)) / 600, rel=0.01)
+    assert not sizes[[0, 1, 2, 3, 5]].any()

@@ -7,7 +7,7 @@ from tolerances import WARP_LINEAR, WARP_TWIN
 from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import EyeImage, Renderer, Settings, TransferFunction, Volume
-from persp_sw.geometry.faces import tangents
+from persp_sw.geometry.sight import tangents
 from persp_sw.volume.levels import STANDARD_AXES
 from persp_sw.warp.software import warp_eye_image
 

@@ -161,3 +161,56 @@ def warp_pixel(direction, faces):
     left, top = min(int(u), width - 2), min(int(v), height - 2)
     weights = np.outer([1 - (v - top), v - top], [1 - (u - left), u - left])
     return np.einsum("yx,yxc->c", weights, image[top : top + 2, left : left + 2].astype(float))
+
+
+def clip_polygon(polygon, normals):
+    """The part of a convex polygon where n·p ≥ 0 for all normals (Sutherland, Hodgman 1974)."""
+    for normal in normals:
+        inside = polygon @ normal
+        kept = []
+        for a, b, da, db in zip(
+            polygon, np.roll(polygon, -1, axis=0), inside, np.roll(inside, -1), strict=True
+        ):
+            if da >= 0:
+                kept.append(a)
+            if (da >= 0) != (db >= 0):
+                kept.append(a + (b - a) * (da / (da - db)))
+        polygon = np.array(kept).reshape(-1, 3)
+    return polygon
+
+
+def pyramid_normals(axis, sign):
+    """Inward normals of the rays whose largest component is `sign` along `axis`."""
+    normals = np.zeros((4, 3))
+    normals[:, axis] = sign
+    normals[:2, (axis + 1) % 3] = -1, 1
+    normals[2:, (axis + 2) % 3] = -1, 1
+    return normals
+
+
+def seen_corners(sides, matrix, size):
+    """Corners of polygons' parts inside a window whose pixel (column, row, 1) looks along `matrix` · it."""
+    width, height = size
+    corners = np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1]]) @ matrix.T
+    normals = np.cross(corners, np.roll(corners, -1, axis=0))
+    normals *= np.sign(normals @ (matrix @ (width / 2, height / 2, 1)))[:, None]
+    return [part for side in sides if len(part := clip_polygon(side, normals))]
+
+
+def pixel_sizes(matrix, size, low, high, axis, sign, own, grid, step=1e-6):
+    """∂t/∂pixel's smaller singular value, by differences, at each of a grid's pixels that shows the box."""
+    others = [(axis + 1) % 3, (axis + 2) % 3]
+    result = []
+    for v, u in np.ndindex(grid, grid):
+        pixel = np.array([(u + 0.5) / grid * size[0], (v + 0.5) / grid * size[1], 1])
+        ray = matrix @ pixel
+        along = sign * ray[axis]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = np.sort([low / ray, high / ray], axis=0)
+        met = max(ends[0].max(), 0) <= ends[1].min()
+        if along <= 0 or not met or (own and along < np.abs(ray).max()):
+            continue
+        moved = [matrix @ (pixel + step * delta) for delta in np.eye(3)[:2]]
+        columns = [(m[others] / (sign * m[axis]) - ray[others] / along) / step for m in moved]
+        result.append(np.linalg.svd(np.array(columns).T, compute_uv=False)[-1])
+    return result

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from ..kernels.scanline import STEEP
 from ..kernels.state import TILE
 from .parallel import Shear
-from .pitch import volume_pitch, wall_pitch
-from .sight import EyeGeometry, clip, pyramid, seen_polygons, tangents
+from .sight import EyeGeometry, Sight, Sights
 
 # Rays this far (pixels) beyond the last pixel's centre are still found.
 _GUARD = 1e-6
@@ -164,64 +163,63 @@ def _parallel_parts(geometry: EyeGeometry, previous: Sequence[Face]) -> list[_Pa
     """The one part that serves an eye at infinity; none where no wall shows the box."""
     before = previous[0] if len(previous) == 1 else None
     shear = Shear.along(-geometry.eye, _STAY, before and (before.axis, before.sign))
-    points = shear.seen(geometry)
-    if not len(points):
+    sight = shear.sight(geometry)
+    if sight is None:
         return []
     pitch = max(1.0, min(shear.pixel_size(geometry, view) for view in geometry.views))  # a pixel a voxel
     depth = geometry.high[shear.axis] - geometry.low[shear.axis]
-    low, high = points.min(0), points.max(0)
-    return [_Part(shear.axis, shear.sign, low, high, depth, pitch, shear.tangents)]
+    return [_Part(shear.axis, shear.sign, sight.low, sight.high, depth, pitch, shear.tangents)]
 
 
 def _parts(geometry: EyeGeometry, limit: float, previous: Sequence[Face]) -> list[_Part]:
     """One part if one face can serve, else one for every pyramid that holds something of what is seen."""
-    polygons = [polygon for view in geometry.views for polygon in seen_polygons(geometry, view)]
-    if not polygons:
-        return []
-    points = np.concatenate(polygons)
-    single = _single_face(points, limit, previous)
-    if single is not None:
-        return [_part(geometry, *single, points, np.inf)]
-    parts = []
-    for axis in range(3):
-        for sign in (-1, 1):
-            own = [clip(polygon, pyramid(axis, sign)) for polygon in polygons]
-            own = [polygon for polygon in own if len(polygon)]
-            if own:
-                parts.append(_part(geometry, axis, sign, np.concatenate(own), 1.0))
-    return parts
+    sights = Sights.of(geometry)
+    single = _single_face(sights, limit, previous)
+    if single is None:
+        shown = {direction: sights.own(direction) for direction in range(6)}
+    else:
+        shown = {single: sights.whole(single)}
+    pixels = sights.pixel_sizes(geometry, single)
+    return [
+        _part(geometry, direction, sight, 1.0 if single is None else np.inf, pixels[direction])
+        for direction, sight in shown.items()
+        if sight is not None
+    ]
 
 
-def _part(geometry: EyeGeometry, axis: int, sign: int, points: NDArray[np.float64], limit: float) -> _Part:
-    """The part of a face that holds the rays to `points` as far as their tangents are below `limit`."""
-    points = points[points[:, axis] * sign > 0]
-    t_i, t_j, distance = tangents(points, axis, sign).T
-    low = np.clip([t_i.min(), t_j.min()], -limit, limit)
-    high = np.clip([t_i.max(), t_j.max()], -limit, limit)
-    pitch = max(volume_pitch(geometry, points, distance), wall_pitch(geometry, axis, sign, limit))
-    return _Part(axis, sign, low, high, distance.max(), pitch)
+def _part(geometry: EyeGeometry, direction: int, sight: Sight, limit: float, pixel: float) -> _Part:
+    """The part of a face that holds the rays of a sight, as far as their tangents are below `limit`."""
+    low, high = np.clip(sight.low, -limit, limit), np.clip(sight.high, -limit, limit)
+    pitch = max(_volume_pitch(geometry, sight), pixel)
+    return _Part(direction // 2, 1 if direction % 2 else -1, low, high, sight.farthest, pitch)
 
 
-def _single_face(
-    points: NDArray[np.float64], limit: float, previous: Sequence[Face]
-) -> tuple[int, int] | None:
-    """The direction in which all points lie in front with the smallest largest tangent, if below `limit`.
+def _volume_pitch(geometry: EyeGeometry, sight: Sight) -> float:
+    """One pixel a voxel on the nearest slice, but no finer than half a pixel a voxel on the farthest.
+
+    The nearest is where the box begins; from inside it is the eye's own, or where the near distance lets it.
+    """
+    front = 0.0 if geometry.inside else max(sight.nearest, 0.0)
+    return float(1 / max(front, geometry.near / sight.steepest, sight.farthest / 2))
+
+
+def _single_face(sights: Sights, limit: float, previous: Sequence[Face]) -> int | None:
+    """The direction in which all is in front of the eye with the smallest largest tangent, if below `limit`.
 
     After one face, another must be better by a margin; after several, one must be good enough by a margin.
     """
-    before = [(face.axis, face.sign) for face in previous]
+    before = [2 * face.axis + (face.sign > 0) for face in previous]
     if len(before) > 1:
         limit = max(limit / _STAY, 1.0)
     best, best_tangent = None, np.inf
-    for axis in range(3):
-        for sign in (-1, 1):
-            t_i, t_j, distance = tangents(points, axis, sign).T
-            if distance.min() > 0:
-                steepest = max(np.abs(t_i).max(), np.abs(t_j).max())
-                if steepest <= limit:
-                    judged = steepest / _STAY if before == [(axis, sign)] else steepest
-                    if judged <= best_tangent:
-                        best, best_tangent = (axis, sign), judged
+    for direction in range(6):
+        sight = sights.whole(direction)
+        if sight is not None and sight.nearest > 0:
+            steepest = max(np.abs(sight.low).max(), np.abs(sight.high).max())
+            if steepest <= limit:
+                judged = steepest / _STAY if before == [direction] else steepest
+                if judged <= best_tangent:
+                    best, best_tangent = direction, judged
     return best
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Matrix
 from ..volume.levels import STANDARD_AXES
-from .sight import EyeGeometry, box_sides, clip_to_window
+from .sight import EyeGeometry, Sight, Sights, box_sides
 from .view import View
 
 
@@ -56,20 +56,14 @@ class Shear:
         world_from_pixel = np.vstack([view.wall.world_from_pixel, (0, 0, 1)])
         return self.plane_from_object @ object_from_world @ world_from_pixel
 
-    def seen(self, geometry: EyeGeometry) -> NDArray[np.float64]:
-        """(n, 2) corners (i, j), on slice k = 0, of what the walls show of the box."""
-        sides = [
-            np.column_stack([side, np.ones(4)]) @ self.plane_from_object.T
-            for side in box_sides(geometry.low, geometry.high)
-        ]
-        parts = [
-            polygon
-            for view in geometry.views
-            for polygon in clip_to_window(
-                sides, self.plane_from_pixel(geometry.object_from_world, view), view.size
-            )
-        ]
-        return np.concatenate([np.empty((0, 3)), *parts])[:, :2]
+    def sight(self, geometry: EyeGeometry) -> Sight | None:
+        """Bounds (i, j), on slice k = 0, of what the walls show of the box."""
+        sides = box_sides(geometry.low, geometry.high)
+        points = np.concatenate([sides, np.ones((6, 4, 1))], -1) @ self.plane_from_object.T
+        matrices = [self.plane_from_pixel(geometry.object_from_world, view) for view in geometry.views]
+        sizes = [view.size for view in geometry.views]
+        # (i, j, 1) are tangents in direction +z, whose axes i, j, k are x, y, z.
+        return Sights(points, matrices, sizes, np.eye(3)).whole(5)
 
     def pixel_size(self, geometry: EyeGeometry, view: View) -> float:
         """The finest that a wall can show, in voxels: the smaller singular value of ∂(i, j)/∂pixel."""

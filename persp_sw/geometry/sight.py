@@ -1,6 +1,6 @@
 """What an eye sees of a box through its walls: the box's sides, clipped to each wall's frustum.
 
-Everything is in object (voxel index) space relative to the eye.
+Everything is in object (voxel index) space relative to the eye. The six directions are −x, +x, −y … +z.
 """
 
 from __future__ import annotations
@@ -12,11 +12,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Matrix
+from ..kernels import sight
 from ..volume.levels import STANDARD_AXES
 from .view import View
 
+# Part of a wall's pixels that may be finer than the pitch asked for: at grazing angles a few are 30× finer.
+_QUANTILE = 0.1
+# Points a side of the grid on which a wall's pixel size is measured.
+_GRID = 24
 # An eye so near to the plane of a side (voxels) is in it.
 _TOUCHES = 1e-9
+# Which end of each axis, 0 or 1, the four corners of a box's six sides have.
+_SIDES = np.array(
+    [
+        [np.roll((end, u, v), axis).tolist() for u, v in ((0, 0), (1, 0), (1, 1), (0, 1))]
+        for axis in range(3)
+        for end in (0, 1)
+    ]
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,72 +74,135 @@ def tangents(points: NDArray[np.float64], axis: int, sign: int) -> NDArray[np.fl
         return np.stack([points[..., i] / distance, points[..., j] / distance, distance], -1)
 
 
-def seen_polygons(geometry: EyeGeometry, view: View) -> list[NDArray[np.float64]]:
-    """The box's sides, relative to the eye, clipped to the view's frustum."""
-    low, high = geometry.low - geometry.eye, geometry.high - geometry.eye
-    sides = [side for side in box_sides(low, high) if not _seen_edge_on(side)]
-    return clip_to_window(sides, geometry.object_from_world[:3, :3] @ view.direction_from_pixel, view.size)
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """Bounds of what all walls together show of the box in one direction.
+
+    Attributes
+    ----------
+    low, high
+        Tangents (t_i, t_j).
+    nearest, farthest
+        Distances D of the shown parts of the box's sides; `nearest` ≤ 0 where some lie beside the eye.
+    steepest
+        Largest world length of a ray to them, in units of D.
+    """
+
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+    nearest: float
+    farthest: float
+    steepest: float
 
 
-def clip_to_window(
-    polygons: list[NDArray[np.float64]], matrix: Matrix, size: tuple[int, int]
-) -> list[NDArray[np.float64]]:
-    """The parts of polygons that a window shows whose pixel (column, row, 1) looks along `matrix` · it."""
-    width, height = size
-    corners = (matrix @ np.array([[0, 0, 1], [width, 0, 1], [width, height, 1], [0, height, 1]]).T).T
-    normals = np.cross(corners, np.roll(corners, -1, axis=0))
-    middle = matrix @ (width / 2, height / 2, 1)
-    normals *= np.sign(normals @ middle)[:, None]  # inwards, whatever the pose's handedness
-    parts = [clip(polygon, normals) for polygon in polygons]
-    return [part for part in parts if len(part)]
+class Sights:
+    """What is seen in each of the six directions, and how finely.
+
+    Parameters
+    ----------
+    sides
+        (n, 4, 3) polygons relative to the eye.
+    matrices
+        (views, 3, 3): direction of the ray through each view's pixel point (column, row, 1).
+    sizes
+        (views, 2) pixels.
+    metric
+        (3, 3), AᵀA of the linear part A of world_from_object.
+    """
+
+    def __init__(self, sides, matrices, sizes, metric):
+        self.matrices, self.sizes = np.ascontiguousarray(matrices), np.asarray(sizes, np.float64)
+        self.bounds = np.empty((len(matrices), 6, 2, sight.BOUND_COLUMNS))
+        polygon, spare = np.empty((2, sight.MAX_CORNERS, 3))
+        windows = _window_normals(self.matrices, self.sizes)
+        sight.bound_sight(np.ascontiguousarray(sides), windows, metric, polygon, spare, self.bounds)
+
+    @classmethod
+    def of(cls, geometry: EyeGeometry) -> Sights:
+        """What an eye at a point sees through its walls."""
+        linear = geometry.object_from_world[:3, :3]
+        world_from_object = np.linalg.inv(linear)
+        sides = box_sides(geometry.low - geometry.eye, geometry.high - geometry.eye)
+        return cls(
+            sides[~_seen_edge_on(sides)],
+            linear @ np.stack([view.direction_from_pixel for view in geometry.views]),
+            [view.size for view in geometry.views],
+            world_from_object.T @ world_from_object,
+        )
+
+    def whole(self, direction: int) -> Sight | None:
+        """All that lies before the eye, as far as a direction can show it; None if nothing does."""
+        return self._sight(direction, sight.WHOLE)
+
+    def own(self, direction: int) -> Sight | None:
+        """What is seen along the rays that are a direction's own: largest component along it."""
+        return self._sight(direction, sight.OWN)
+
+    def _sight(self, direction: int, which: int) -> Sight | None:
+        bounds = self.bounds[:, direction, which]
+        if not bounds[:, sight.COUNT].any():
+            return None
+        low, high = bounds.min(0), bounds.max(0)
+        return Sight(
+            low[[sight.LOW_I, sight.LOW_J]],
+            high[[sight.HIGH_I, sight.HIGH_J]],
+            low[sight.NEAREST],
+            high[sight.FARTHEST],
+            high[sight.STEEPEST],
+        )
+
+    def pixel_sizes(self, geometry: EyeGeometry, only: int | None) -> NDArray[np.float64]:
+        """(6,) the finest that a wall shows in each direction, in tangents; 0 where none shows anything.
+
+        `only`: the direction that shows all rays; None where each shows its own.
+        """
+        which = sight.OWN if only is None else sight.WHOLE
+        middles = self.bounds[:, :, which, sight.SUM_X : sight.SUM_Z + 1]
+        # The pixel of a ray is (column, row, 1): scale the ray so that the last is 1.
+        last = np.linalg.inv(self.matrices)[:, 2]
+        scale = np.einsum("vc,vdc->vd", last, middles)
+        middles = middles / np.where(scale > 0, scale, np.inf)[..., None]
+        sizes = np.empty((len(self.matrices), 6))
+        sight.measure_pixels(
+            self.matrices,
+            self.sizes,
+            geometry.low - geometry.eye,
+            geometry.high - geometry.eye,
+            -1 if only is None else only,
+            _QUANTILE,
+            middles,
+            np.empty((6, _GRID * _GRID)),
+            np.empty(6, np.int64),
+            sizes,
+        )
+        sizes[sizes == 0] = np.inf
+        finest = sizes.min(0)
+        return np.where(np.isfinite(finest), finest, 0.0)
 
 
-def box_sides(low: NDArray[np.float64], high: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """The corners, (4, 3), of a box's six sides."""
-    sides = []
-    for axis in range(3):
-        u, v = (axis + 1) % 3, (axis + 2) % 3
-        for end in (low, high):
-            side = np.empty((4, 3))
-            side[:, axis] = end[axis]
-            side[:, u] = low[u], high[u], high[u], low[u]
-            side[:, v] = low[v], low[v], high[v], high[v]
-            sides.append(side)
-    return sides
+def _window_normals(matrices: NDArray[np.float64], sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(views, 4, 3) inward normals of the planes through the eye and the edges of each view's window."""
+    corners = np.zeros((len(matrices), 3, 5))
+    corners[:, 2] = 1
+    corners[:, 0, 1:3] = sizes[:, :1]
+    corners[:, 1, 2:4] = sizes[:, 1:]
+    corners[:, :2, 4] = sizes / 2  # the middle
+    rays = (matrices @ corners).swapaxes(1, 2)
+    normals = np.cross(rays[:, :4], rays[:, [1, 2, 3, 0]])
+    return normals * np.sign(normals @ rays[:, 4, :, None])  # inwards, whatever the pose's handedness
 
 
-def _seen_edge_on(side: NDArray[np.float64]) -> bool:
-    """Whether the eye, at the origin, lies in the plane of a box's side: such sides are not needed.
+def box_sides(low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(6, 4, 3): the corners of a box's sides −x, +x, −y …"""
+    ends = np.stack([low, high])
+    return np.stack([ends[_SIDES[..., axis], axis] for axis in range(3)], -1)
+
+
+def _seen_edge_on(sides: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which sides of a box hold the eye, the origin, in their plane: such sides are not needed.
 
     A ray that is in the box for more than a point crosses two sides, at most one of which holds the eye; so
     every such ray meets another, from without or from within.
     """
-    across = np.ptp(side, axis=0) == 0
-    return bool((np.abs(side[0, across]) <= _TOUCHES).any())
-
-
-def clip(polygon: NDArray[np.float64], normals: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The part of a convex polygon where n·p ≥ 0 for all normals (Sutherland, Hodgman 1974)."""
-    for normal in normals:
-        inside = polygon @ normal
-        kept = []
-        for a, b, da, db in zip(
-            polygon, np.roll(polygon, -1, axis=0), inside, np.roll(inside, -1), strict=True
-        ):
-            if da >= 0:
-                kept.append(a)
-            if (da >= 0) != (db >= 0):
-                kept.append(a + (b - a) * (da / (da - db)))
-        if not kept:
-            return np.empty((0, 3))
-        polygon = np.array(kept)
-    return polygon
-
-
-def pyramid(axis: int, sign: int) -> NDArray[np.float64]:
-    """Inward normals of the rays whose largest component is `sign` along `axis`."""
-    normals = np.zeros((4, 3))
-    normals[:, axis] = sign
-    normals[:2, (axis + 1) % 3] = -1, 1
-    normals[2:, (axis + 2) % 3] = -1, 1
-    return normals
+    axes = np.arange(6) // 2
+    return np.abs(sides[np.arange(6), 0, axes]) <= _TOUCHES
