@@ -7,8 +7,8 @@ from views import random_pose
 
 from persp_sw import View, Volume
 from persp_sw.errors import ViewError
-from persp_sw.geometry.faces import tangents
 from persp_sw.geometry.factorization import factorize, viewport_from_world
+from persp_sw.geometry.sight import tangents
 from persp_sw.volume.levels import STANDARD_AXES
 
 
