@@ -165,6 +165,24 @@ def test_a_grazing_wall_does_not_drive_the_pitch():
     assert max(face.size) <= 64
 
 
+def test_inside_one_face_must_not_take_much_more_work_than_several():
+    """Askew views from inside: a face would need the corners of its rectangle that nobody looks at."""
+    volume = empty_volume((65, 65, 65))
+    askew = View.look_at((0, 32, 32), (52, 22, 38), (0, 0, 1), 100, (256, 256))
+    narrow = View.look_at((0, 32, 32), (52, 22, 38), (0, 0, 1), 60, (256, 256))
+    outside = View.look_at((-70, 32, 32), (-18, 22, 38), (0, 0, 1), 100, (256, 256))
+    several, one, far = (plan(geometry_of(volume, view)) for view in (askew, narrow, outside))
+    assert len(several) > 1 and len(one) == len(far) == 1
+    reach = np.array(
+        askew.direction_from_pixel @ np.array([[0, 0, 256, 256], [0, 256, 0, 256], [1, 1, 1, 1]])
+    )
+    assert (reach[0] > 0).all()  # one face could: all rays go along +x
+    t = np.abs(reach[1:] / reach[0])
+    assert t.max() < 3
+    area = np.prod(np.ptp(reach[1:] / reach[0], axis=1)) / one[0].pitch ** 2
+    assert sum(face.size[0] * face.size[1] for face in several) < area
+
+
 # --- The kernels' plain twins -----------------------------------------------------------------------------
 
 

@@ -21,6 +21,10 @@ from .sight import EyeGeometry, Sight, Sights
 _GUARD = 1e-6
 # A rectangle of n pitches takes up to n + 3 pixels, whatever its position against the pixels.
 _EXTRA = 3
+# Where the box begins nearer than this part of the distance at which it ends, one face, which has no seam,
+# may take so many times the work of several. (At a tangent of 2 it takes 15.2 instead of 8.4 M samples.)
+_CLOSE = 1 / 8
+_WORTH = 1.5
 # What a previous frame chose stays while nothing is better by this factor.
 _STAY = 1.1
 
@@ -91,8 +95,9 @@ def plan_faces(
 ) -> list[Face]:
     """The faces that hold a ray which meets the box and some wall's frustum; none if no ray does.
 
-    One face serves while no such ray has a tangent beyond `single_face_tangent` in it; else several do, each
-    limited to its own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
+    One face serves while no such ray has a tangent beyond `single_face_tangent` in it, and while it takes not
+    much more work, if the eye is close or inside, than several would; else several do, each limited to its
+    own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
 
     Pixel centres lie at odd multiples of half the pitch. So a picture keeps its rays when its rectangle grows
     by a pixel, none of them lies in a slice or a side, where nobody can decide, and where several faces meet,
@@ -141,6 +146,11 @@ class _Part:
     def longest(self) -> float:
         return float((self.high - self.low).max())
 
+    @property
+    def work(self) -> float:
+        """Samples that its own pitch takes, if all is seen."""
+        return float(max(np.prod(self.high - self.low), 1e-6) * self.depth / self.pitch**2)
+
     def face(self, pitch: float, most: int) -> Face:
         """The pixels that the warp's bilinear look-up needs, in whole packets, at most `most` in a row.
 
@@ -172,16 +182,31 @@ def _parallel_parts(geometry: EyeGeometry, previous: Sequence[Face]) -> list[_Pa
 
 
 def _parts(geometry: EyeGeometry, limit: float, previous: Sequence[Face]) -> list[_Part]:
-    """One part if one face can serve, else one for every pyramid that holds something of what is seen."""
+    """One part if one face can serve, else one for every pyramid that sees something.
+
+    Close by and inside, where a rectangle is filled with what is seen, one face must not take much more work.
+    """
     sights = Sights.of(geometry)
     single = _single_face(sights, limit, previous)
-    if single is None:
+    one = [] if single is None else _parts_of(geometry, sights, single)
+    if one and not (geometry.inside or sights.whole(single).nearest < _CLOSE * one[0].depth):
+        return one
+    several = _parts_of(geometry, sights, None)
+    worth = _WORTH * (_STAY if len(previous) == 1 else 1 / _STAY if previous else 1)
+    if one and one[0].work <= worth * sum(part.work for part in several):
+        return one
+    return several
+
+
+def _parts_of(geometry: EyeGeometry, sights: Sights, only: int | None) -> list[_Part]:
+    """A part for each direction that sees something: `only` one, for all rays, or each for its own."""
+    pixels = sights.pixel_sizes(geometry, only)
+    if only is None:
         shown = {direction: sights.own(direction) for direction in range(6)}
     else:
-        shown = {single: sights.whole(single)}
-    pixels = sights.pixel_sizes(geometry, single)
+        shown = {only: sights.whole(only)}
     return [
-        _part(geometry, direction, sight, 1.0 if single is None else np.inf, pixels[direction])
+        _part(geometry, direction, sight, 1.0 if only is None else np.inf, pixels[direction])
         for direction, sight in shown.items()
         if sight is not None
     ]
@@ -227,9 +252,8 @@ def _common_pitch(parts: list[_Part]) -> float:
     """One pitch for all faces with the work of each face's own: Σ area · depth / pitch² is the same."""
     if len(parts) == 1:
         return parts[0].pitch
-    work = np.array([max(np.prod(part.high - part.low), 1e-6) * part.depth for part in parts])
-    own = work / np.square([part.pitch for part in parts])
-    return float(np.sqrt(work.sum() / own.sum()))
+    work = np.array([part.work for part in parts])
+    return float(np.sqrt((work * np.square([part.pitch for part in parts])).sum() / work.sum()))
 
 
 def _seam_pitch(pitch: float, longest: float, most: int, previous: Sequence[Face], *, exact: bool) -> float:
