@@ -69,12 +69,12 @@ from numba.extending import intrinsic  # noqa: E402
 
 __all__ = [
     "VECTORS",
-    "allocating_kernel",
     "bits_of",
     "compile_seconds",
     "inlined_kernel",
     "intrinsic",
     "kernel",
+    "lean_kernel",
     "max_threads",
     "parallel_kernel",
     "popcount",
@@ -88,10 +88,11 @@ __all__ = [
 # No fast-math: NaN marks voxels that are not there and must stay NaN. `contract` lets a*b + c fuse.
 _OPTIONS = {"nogil": True, "cache": True, "fastmath": {"contract"}, "error_model": "numpy"}
 
-# Without `_nrt`, an array's references are counted, atomically, at every call: 10 ns each.
-kernel = numba.njit(_nrt=False, **_OPTIONS)
-allocating_kernel = numba.njit(**_OPTIONS)  # returns new arrays
+kernel = numba.njit(**_OPTIONS)
 parallel_kernel = numba.njit(parallel=True, **_OPTIONS)
+# For helpers of inner loops, which may not make arrays: else references are counted, atomically, at
+# every call, 10 ns each.
+lean_kernel = numba.njit(_nrt=False, **_OPTIONS)
 # An array is passed as eight numbers: a call with ten of them for every packet took longer than the packet.
 inlined_kernel = numba.njit(_nrt=False, forceinline=True, **_OPTIONS)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import _jit
 from .arrays import Image
+from .detail_zones import detail_zones
 from .eye_image import EyeImage
 from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.parts import Part, shown_parts
@@ -21,6 +22,7 @@ from .kernels.scanline import Level
 from .optics.classification import Classification
 from .seams import close_seams
 from .settings import Settings
+from .volume.detail import DetailStore
 from .volume.levels import STANDARD_AXES
 from .volume.runs import RunStore
 
@@ -29,7 +31,7 @@ _OPAQUE = 3.0
 
 
 def composite_eye(
-    store: RunStore,
+    detail: DetailStore,
     classification: Classification,
     regions: Regions,
     settings: Settings,
@@ -41,11 +43,11 @@ def composite_eye(
 
     `previous`: the faces of this eye's frame before, which are kept where they serve about as well.
     """
-    volume = store.volume
+    volume = detail.volume
     pose = volume.world_from_object
     object_from_world = np.linalg.inv(pose)
     eye_object = object_from_world[:3] @ (*eye.position, eye.w)
-    parts, low, high = _seen_parts(store, regions, eye_object, eye.w)
+    parts, low, high = _seen_parts(detail.store(0), regions, eye_object, eye.w)
     faces: list[Face] = []
     if parts:
         views = [View(eye, wall) for wall in walls]
@@ -63,7 +65,7 @@ def composite_eye(
     image = EyeImage(eye, pose, tuple(faces), pixels, 0)
     images = [image.face_pixels(number) for number in range(len(faces))]
     samples = sum(
-        _composite(store, classification, part, settings, eye, eye_object, face, threads, out)
+        _composite(detail, classification, part, settings, eye, eye_object, face, threads, out)
         for face, out in zip(faces, images, strict=True)
         for part in parts
     )
@@ -95,7 +97,7 @@ def _enough_samples(classification: Classification, linear: NDArray[np.float64])
 
 
 def _composite(
-    store: RunStore,
+    detail: DetailStore,
     classification: Classification,
     part: Part,
     settings: Settings,
@@ -105,45 +107,61 @@ def _composite(
     threads: int,
     out: Image,
 ) -> int:
-    """Composite one part on one face into `out`; returns the samples taken."""
-    volume = store.volume
+    """Composite one part on one face behind what `out` holds; returns the samples taken."""
+    volume = detail.volume
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
     least = settings.samples_per_interval or _enough_samples(classification, linear)
     per_interval = face.samples_per_interval(least)
-    runs = store.axis(face.axis, pairs=per_interval > 1)
     low, high = part.low[axes], part.high[axes]
     (o_i, o_j), offset_pitch, (t_i, t_j), pitch, k_0 = face.rays(eye_object[axes])
-    if eye.is_at_infinity and face.sign < 0:  # distances count from the front slice
-        last = runs.size[2] - 1.0
+    if eye.is_at_infinity and face.sign < 0:  # distances count from the last slice, which is in front
+        last = volume.size[face.axis] - 1.0
         o_i, o_j, k_0 = o_i - t_i * (last - k_0), o_j - t_j * (last - k_0), last
-    base = max(face.sign * ((low if face.sign > 0 else high)[2] - k_0), 0.0)
+    front, back = (face.sign * (k - k_0) for k in (low[2], high[2])[:: face.sign])
+    base = max(front, 0.0)
     geometry = np.array([o_i, o_j, offset_pitch, t_i, t_j, pitch, k_0, face.sign, base, least, eye.near])
     half_spaces = part.half_spaces[:, [*axes, 3]]
+    table = Table(classification.table, np.float32(classification.origin), np.float32(classification.scale))
     samples = np.zeros(out.shape[0], np.int64)
+    taken = 0
     _jit.set_threads(threads)
-    level = Level(
-        runs.visible,
-        runs.pairs,
-        runs.needed,
-        runs.offsets,
-        runs.voxels,
-        np.ones(3),
-        np.column_stack([low, high]).ravel(),
-        runs.size[2],
-    )
-    composite_face(
-        geometry,
-        linear.T @ linear,
-        np.ascontiguousarray(half_spaces),
-        np.array([np.inf, np.inf]),
-        per_interval,
-        level,
-        level,
-        Table(classification.table, np.float32(classification.origin), np.float32(classification.scale)),
-        np.float32(settings.residual),
-        threads,
-        samples,
-        out,
-    )
-    return int(samples.sum())
+    for zone in detail_zones(pitch, offset_pitch, back, len(detail) if settings.level_of_detail else 1):
+        if zone.far <= front:
+            continue
+        # Distances along the axis as half-spaces: D ≥ near and D ≤ far.
+        limits = [(0, 0, face.sign, -face.sign * k_0 - zone.near)] * (zone.near > 0)
+        limits += [(0, 0, -face.sign, face.sign * k_0 + zone.far)] * (zone.far < np.inf)
+        levels = [zone.fine + n * (zone.blend[0] < np.inf) for n in (0, 1)]
+        fine, coarse = (_level(detail, number, face.axis, low, high, per_interval > 1) for number in levels)
+        composite_face(
+            geometry,
+            linear.T @ linear,
+            np.array([*half_spaces, *limits], np.float64),
+            np.array(zone.blend),
+            per_interval,
+            fine,
+            coarse,
+            table,
+            np.float32(settings.residual),
+            threads,
+            samples,
+            out,
+        )
+        taken += int(samples.sum())
+    return taken
+
+
+def _level(
+    detail: DetailStore,
+    number: int,
+    axis: int,
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    pairs: bool,
+) -> Level:
+    """Level `number` for the kernel; low, high: corners of the shown box, finest level, standard space."""
+    runs = detail.store(number).axis(axis, pairs=pairs)
+    factor = detail.levels.factor(number)[list(STANDARD_AXES[axis])].astype(np.float64)
+    box = np.column_stack([low / factor, high / factor]).ravel()
+    return Level(runs.visible, runs.pairs, runs.needed, runs.offsets, runs.voxels, factor, box, runs.size[2])

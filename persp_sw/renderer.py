@@ -17,6 +17,7 @@ from .optics.classification import Classification
 from .optics.presets import choose
 from .optics.transfer import TransferFunction
 from .settings import Settings
+from .volume.detail import DetailStore
 from .volume.grid import Volume
 from .volume.runs import RunStore
 from .volume.visibility import EverythingVisible
@@ -46,8 +47,8 @@ class Renderer:
 
     Attributes
     ----------
-    runs
-        The run-length store.
+    detail
+        The run-length stores of all levels of detail; `runs` is that of the finest.
     last
         Statistics of the last picture: `encode_ms`, `composite_ms`, `warp_ms`, `compile_ms` (numba; not in
         the others), `faces`, `intermediate_size` (width and height of the largest face), `samples`,
@@ -68,13 +69,18 @@ class Renderer:
         self.last: dict[str, Any] = {}
         self._transfer = transfer or choose(volume).transfer
         self._classification = Classification.of(self._transfer, volume)
-        self.runs = RunStore(volume, self._visibility(), progress)
+        self.detail = DetailStore(volume, self._visibility(), progress)
         self._skipping = self.settings.skip_empty
         if min(volume.size) == 1:
             _log.warning(
                 "%s is one voxel thick: the box of its voxel centres holds nothing, the picture is empty",
                 "×".join(map(str, volume.size)),
             )
+
+    @property
+    def runs(self) -> RunStore:
+        """The run-length store of the finest level."""
+        return self.detail.store(0)
 
     @property
     def transfer(self) -> TransferFunction:
@@ -85,7 +91,7 @@ class Renderer:
     def transfer(self, transfer: TransferFunction | None) -> None:
         self._transfer = transfer or choose(self.volume).transfer
         self._classification = Classification.of(self._transfer, self.volume)
-        self.runs.classify(self._visibility())
+        self.detail.classify(self._visibility())
 
     def composite(self, eye: Eye, walls: Sequence[Wall], previous: EyeImage | None = None) -> EyeImage:
         """One eye image that serves all `walls`; the eye may be anywhere, inside the volume too.
@@ -98,11 +104,11 @@ class Renderer:
         """
         if self._skipping != self.settings.skip_empty:
             self._skipping = self.settings.skip_empty
-            self.runs.classify(self._visibility())
-        compiled, encoded = _jit.compile_seconds(), self.runs.encode_seconds
+            self.detail.classify(self._visibility())
+        compiled, encoded = _jit.compile_seconds(), self.detail.encode_seconds
         start = perf_counter()
         image = composite_eye(
-            self.runs,
+            self.detail,
             self._classification,
             self.regions,
             self.settings,
@@ -111,7 +117,7 @@ class Renderer:
             previous.faces if previous else (),
         )
         spent = perf_counter() - start
-        compiled, encoded = _jit.compile_seconds() - compiled, self.runs.encode_seconds - encoded
+        compiled, encoded = _jit.compile_seconds() - compiled, self.detail.encode_seconds - encoded
         self.last = {
             "encode_ms": 1e3 * encoded,
             "composite_ms": 1e3 * max(spent - encoded - compiled, 0.0),
@@ -122,7 +128,7 @@ class Renderer:
                 max((f.size for f in image.faces), key=lambda s: s[0] * s[1], default=(0, 0))
             ),
             "samples": image.samples,
-            "runs_bytes": self.runs.bytes,
+            "runs_bytes": self.detail.bytes,
             "threads": self.settings.threads or _jit.max_threads(),
         }
         return image

@@ -25,6 +25,8 @@ class Settings:
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent
         One face of the eye image serves while no ray is steeper against it than this tangent, 1 … 8.
+    level_of_detail
+        Take coarser voxels where pixels are more than two voxels apart, which would alias and cost more.
     skip_empty
         Leave out what the transfer function makes invisible. Changes no pixel; off only for measuring.
     intermediate_size
@@ -46,6 +48,7 @@ class Settings:
     samples_per_interval: int | None = None
     residual: float = 0.005
     single_face_tangent: float = 3.0
+    level_of_detail: bool = True
     skip_empty: bool = True
     max_intermediate: int = 4096
     intermediate_size: int | None = None

@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import VECTORS, allocating_kernel, inlined_kernel, kernel, parallel_kernel, prange, trailing_zeros
+from .._jit import VECTORS, inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
 from .encode import BLOCK, packed_position
 from .packet_portable import SCRATCH, WINDOW
 from .scanline import (
@@ -95,7 +95,7 @@ class Tiles(NamedTuple):
 _FRESH, _GOING, _DONE = 0, 1, 2  # states of a tile
 
 
-@allocating_kernel
+@kernel
 def _new_tiles(number):
     return Tiles(
         np.empty(number, np.int64),
@@ -108,7 +108,7 @@ def _new_tiles(number):
     )
 
 
-@kernel
+@lean_kernel
 def _find_ranges(n, first, t_j, offset_j, face, metric, half_spaces, ranges):
     """Of each ray: nearest and farthest shown distance, and its world length in one slice interval.
 
@@ -143,7 +143,7 @@ def _find_ranges(n, first, t_j, offset_j, face, metric, half_spaces, ranges):
             ranges[np.uint64(n) + l] = leaves if leaves < farthest else farthest
 
 
-@kernel
+@lean_kernel
 def _start_tile(n, v, pixel, base, residual, out, tiles, reach, at):
     """Take up the tile's pixels and note their ranges; `reach`: nearest and farthest of all.
 
@@ -215,7 +215,7 @@ def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
     return samples, False
 
 
-@kernel
+@lean_kernel
 def _composite_tile(
     n, pixel, per_interval, stride_mask, reach, base, chunk, count, fine, coarse, table, tiles, at
 ):
@@ -255,7 +255,7 @@ def _composite_tile(
     return samples, False
 
 
-@kernel
+@lean_kernel
 def _composite_row(
     v, face, metric, half_spaces, zone, per_interval, fine, coarse, table, residual, chunk, tiles, out
 ):

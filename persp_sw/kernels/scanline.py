@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import allocating_kernel, inlined_kernel, kernel
+from .._jit import inlined_kernel, kernel, lean_kernel
 from .encode import WORD
 from .state import TILE
 
@@ -67,7 +67,7 @@ class Chunk(NamedTuple):
     flags: np.ndarray
 
 
-@allocating_kernel
+@kernel
 def new_chunk(words):
     """Room for a chunk of scanlines of so many words of blocks."""
     hits = np.zeros(CHUNK // 8, np.uint64)
@@ -75,7 +75,7 @@ def new_chunk(words):
     return Chunk(np.empty(4, np.int64), planes, masks, hits, hits.view(np.uint8))
 
 
-@kernel
+@lean_kernel
 def plane_range(t_j, offset_j, face, near, far, per_interval, level):
     """First sample plane of a level that scanline t_j may need, front to back, and the one after the last.
 
@@ -143,7 +143,7 @@ def _place_plane(p, q, number, share, t_j, offset_j, face, per_interval, level, 
     return seen != np.uint64(0)
 
 
-@kernel
+@lean_kernel
 def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk):
     """Take the next sample planes, front to back, empty ones left out; returns their number.
 
@@ -188,7 +188,7 @@ def window(masks, p, block):
     return (masks[p, w] >> s) | ((masks[p, w + _ONE] << _ONE) << (_BITS - s))
 
 
-@kernel
+@lean_kernel
 def find_hits(pixel, count, stride_mask, beyond, chunk):
     """Set the flags of the chunk's planes that a tile may meet.
 
