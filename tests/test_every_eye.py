@@ -9,7 +9,7 @@ from exact_faces import COLOUR, VALUE, assert_covered, assert_exact
 from tolerances import CONTINUOUS, INSIDE_SMOOTH_DB, SEAM
 from views import random_pose
 
-from persp_sw import Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, load, reference
+from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, load, reference
 from persp_sw.errors import SettingsError
 from persp_sw.measure.metrics import psnr
 from persp_sw.volume.phantoms import synthetic_ct
@@ -90,6 +90,7 @@ def test_a_homogeneous_box_is_exact_and_covered_from_inside(place, size):
 def test_looking_out_of_a_side_costs_nothing():
     volume = Volume(np.full((9, 9, 9), 200, np.uint8))
     renderer = Renderer(volume, SMOOTH)
+    assert renderer.composite(Eye((4, 4, 4)), []).faces == ()
     for eye, centre in (((0, 4, 4), (-9, 4, 5)), ((0, 8, 4), (-5, 14, 4)), ((8, 8, 8), (9, 9.5, 9))):
         view = View.look_at(eye, centre, (0, 0, 1), 60, (16, 16))
         assert not renderer.render(view).any()

@@ -108,6 +108,8 @@ def plan_faces(
     kept a little beyond the point where others would be chosen, so that an eye at rest on that point does not
     make the picture flicker.
     """
+    if not geometry.views:
+        return []
     if geometry.at_infinity:
         parts = _parallel_parts(geometry, previous)
     else:
