@@ -80,6 +80,7 @@ __all__ = [
     "popcount",
     "power_of_two",
     "prange",
+    "prefetch",
     "set_threads",
     "trailing_zeros",
     "types",
@@ -145,6 +146,25 @@ def power_of_two(_context, shifted):
         return builder.bitcast(builder.add(exponent, bias), ir.FloatType())
 
     return types.float32(types.float32), build
+
+
+@intrinsic
+def prefetch(_context, array, index):
+    """Ask for the cache line of array[index], a one-dimensional array's; nothing happens beyond its ends."""
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        name = "llvm.prefetch.p0"
+        function = builder.module.globals.get(name) or ir.Function(
+            builder.module, ir.FunctionType(ir.VoidType(), [byte, word, word, word]), name
+        )
+        read, everywhere, is_data = ir.Constant(word, 0), ir.Constant(word, 3), ir.Constant(word, 1)
+        address = builder.bitcast(builder.gep(data, [arguments[1]]), byte)
+        builder.call(function, [address, read, everywhere, is_data])
+        return context.get_dummy_value()
+
+    return types.void(array, types.int64), build
 
 
 class _CompileClock(event.Listener):

@@ -56,7 +56,7 @@ from .scanline import (
     plane_range,
     window,
 )
-from .state import ALPHA, ENOUGH, LENGTH, RAY_FAR, RAY_NEAR, SECTIONS, TILE
+from .state import ALPHA, ENOUGH, LENGTH, RAY_FAR, RAY_NEAR, SECOND, SECTIONS, TILE, VALUE
 
 if VECTORS:
     from .packet_vector import blend, sample
@@ -80,7 +80,7 @@ class Tiles(NamedTuple):
 
     states [tile]; strides [tile]: a tile takes the planes whose number has none of these bits; reach [tile,
     2]: nearest and farthest distance of any of its pixels; lanes: `SECTIONS` of 16 floats a tile; ranges,
-    scratch, cells: of the tile at work.
+    slots, scratch, cells: of the tile at work.
     """
 
     states: np.ndarray
@@ -88,6 +88,7 @@ class Tiles(NamedTuple):
     reach: np.ndarray
     lanes: np.ndarray
     ranges: np.ndarray
+    slots: np.ndarray
     scratch: np.ndarray
     cells: np.ndarray
 
@@ -103,6 +104,7 @@ def _new_tiles(number):
         np.empty((number, 2), np.float64),
         np.empty(number * TILE * SECTIONS, np.float32),
         np.empty(3 * TILE, np.float64),
+        np.zeros((2, 3), np.float32),
         np.empty(SCRATCH, np.float32),
         np.empty(TILE, np.int32),
     )
@@ -169,8 +171,12 @@ def _start_tile(n, v, pixel, base, residual, out, tiles, reach, at):
 
 
 @inlined_kernel
-def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
-    """A tile on plane p, which stands for [near, far]; returns samples taken and whether all is opaque."""
+def _composite_packet(n, p, pixel, near, far, waiting, chunk, level, table, tiles, at):
+    """A tile on plane p, which stands for [near, far] of each ray.
+
+    Samples are blended two at a time. `waiting`: whether one waits for the next. Returns the samples taken,
+    whether one waits now, and whether all is opaque.
+    """
     planes, lanes, cells, scratch = chunk.planes, tiles.lanes, tiles.cells, tiles.scratch
     low, high = planes[LOW, p], planes[HIGH, p]
     last_cell = np.ceil(high) - 1.0
@@ -182,7 +188,6 @@ def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
     end = np.uint64(np.int64(min(max(x_last, low), last_cell))) + _ONE
     j, k = np.uint64(planes[ROW, p]), np.uint64(planes[SLICE, p])
     weight_j, weight_k = _F(planes[ROW_WEIGHT, p]), _F(planes[SLICE_WEIGHT, p])
-    share = _F(planes[SHARE, p])
     samples = 0
     block = first // _BLOCK
     while block * _BLOCK < end:
@@ -205,14 +210,30 @@ def _composite_packet(n, p, pixel, near, far, chunk, level, table, tiles, at):
             sample(
                 n, np.int64(window_end - begin) + 1, level.voxels, at_00, at_10, at_01, at_11, weight_j,
                 weight_k, _F(x_first - start), _F(step), _F(low - start), _F(high - start),
-                _F(last_cell - start), _F(begin - first), _F(window_end - first), scratch, cells, lanes, at,
+                _F(last_cell - start), _F(begin - first), _F(window_end - first), scratch, cells, lanes,
+                at + np.int64(SECOND if waiting else VALUE),
             )  # fmt: skip
+            slot = _ONE if waiting else _NONE
+            tiles.slots[slot, 0], tiles.slots[slot, 1], tiles.slots[slot, 2] = near, far, planes[SHARE, p]
             samples += n
             begin = window_end
-            if blend(n, table.rows, table.origin, table.scale, share, near, far, scratch, cells, lanes, at):
-                return samples, True
+            if waiting and blend(
+                n, table.rows, table.origin, table.scale, tiles.slots, scratch, cells, lanes, at
+            ):
+                return samples, False, True
+            waiting = not waiting
         block = until
-    return samples, False
+    return samples, waiting, False
+
+
+@inlined_kernel
+def _blend_last(n, table, tiles, at):
+    """Blend a sample that waits for another in vain; returns whether all is opaque."""
+    for l in range(np.uint64(n)):  # noqa: E741
+        tiles.lanes[np.uint64(at) + SECOND + l] = _F(np.nan)
+    return blend(
+        n, table.rows, table.origin, table.scale, tiles.slots, tiles.scratch, tiles.cells, tiles.lanes, at
+    )
 
 
 @lean_kernel
@@ -225,7 +246,7 @@ def _composite_tile(
     """
     planes, nearest, farthest = chunk.planes, reach[0], reach[1]
     stride = stride_mask + 1
-    samples = 0
+    samples, waiting, done = 0, False, False
     for group in range((count + 7) // 8):
         flags = chunk.hits[np.uint64(group)]
         while flags:
@@ -241,18 +262,27 @@ def _composite_tile(
                 # Nothing of a finer level follows; a coarse plane reaches as far back as two fine ones.
                 if planes[LEVEL, p] == 0.0:
                     continue
-                return samples, True
+                done = True
+                break
             if distance + half <= nearest:
                 continue
             near, far = _F(distance - half - base), _F(distance + half - base)
             if planes[LEVEL, p] == 0.0:
-                taken, done = _composite_packet(n, p, pixel, near, far, chunk, fine, table, tiles, at)
+                taken, waiting, done = _composite_packet(
+                    n, p, pixel, near, far, waiting, chunk, fine, table, tiles, at
+                )
             else:
-                taken, done = _composite_packet(n, p, pixel, near, far, chunk, coarse, table, tiles, at)
+                taken, waiting, done = _composite_packet(
+                    n, p, pixel, near, far, waiting, chunk, coarse, table, tiles, at
+                )
             samples += taken
             if done:
-                return samples, True
-    return samples, False
+                break
+        if done:
+            break
+    if waiting:
+        done |= _blend_last(n, table, tiles, at)
+    return samples, done
 
 
 @lean_kernel

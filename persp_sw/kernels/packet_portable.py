@@ -21,6 +21,7 @@ from .state import (
     RAY_NEAR,
     RED,
     ROUNDER,
+    SECOND,
     VALUE,
 )
 
@@ -44,7 +45,7 @@ def sample(
     Positions along i count from any voxel; the rows' voxels from `begin` on, `width` ≤ WINDOW of them, start
     at `at_00` (scanline j, k), `at_10` (j + 1, k), `at_01` (j, k + 1) and `at_11`, the last two not used
     where `weight_k` is 0. `last_cell`: the box's last, to which x at the box's end belongs. `scratch`
-    (SCRATCH floats) and `cells` (16 int32) hold nothing. Result in section VALUE of lanes[at …].
+    (SCRATCH floats) and `cells` (16 int32) hold nothing. Result in lanes[at …].
     """
     length = (width + _CHUNK - 1) // _CHUNK * _CHUNK  # whole vectors: what is read beyond the run is not used
     if weight_k == _F(0.0):
@@ -58,7 +59,7 @@ def sample(
             above, below = _F(voxels[np.uint64(at_01 + i)]), _F(voxels[np.uint64(at_11 + i)])
             far = above + weight_j * (below - above)
             scratch[np.uint64(i)] = near + weight_k * (far - near)
-    values = np.uint64(at) + VALUE
+    values = np.uint64(at)
     for l in range(np.uint64(n)):  # noqa: E741
         place = x + _F(l) * step
         place = place if place > low else low
@@ -76,17 +77,13 @@ def sample(
 
 
 @inlined_kernel
-def blend(n, table, origin, scale, share, near, far, scratch, cells, lanes, at):
-    """Classify the samples and lay them under what is there; they stand for [near, far] of each ray.
-
-    `near`, `far` count from `base`, as the rays' ranges do; `share` scales the extinction. True if no pixel
-    lets enough light through to go on.
-    """
+def _blend_one(n, table, origin, scale, values, share, near, far, scratch, cells, lanes, at):
+    """One of the two samples of `blend`."""
     pixel = np.uint64(at)
     part = share * MINUS_LOG2E
     last = _F(table.shape[0] - 1)
     for l in range(np.uint64(n)):  # noqa: E741
-        value = lanes[pixel + VALUE + l]
+        value = lanes[pixel + values + l]
         entry = (value - origin) * scale + _F(1.5)
         entry = entry if entry > _F(1.0) else _F(1.0)
         entry = entry if entry < last else last
@@ -123,3 +120,18 @@ def blend(n, table, origin, scale, share, near, far, scratch, cells, lanes, at):
         lanes[pixel + ALPHA + l] = accumulated
         going |= accumulated < lanes[pixel + ENOUGH + l]
     return not going
+
+
+@inlined_kernel
+def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
+    """Classify two samples of each pixel, front to back, and lay them under what is there.
+
+    `slots` float32 [2, 3]: [near, far] of the rays that each stands for, counted from `base` as the rays'
+    ranges are, and the share of its extinction. True if no pixel lets enough light through to go on.
+    """
+    _blend_one(
+        n, table, origin, scale, VALUE, slots[0, 2], slots[0, 0], slots[0, 1], scratch, cells, lanes, at
+    )
+    return _blend_one(
+        n, table, origin, scale, SECOND, slots[1, 2], slots[1, 0], slots[1, 1], scratch, cells, lanes, at
+    )  # fmt: skip

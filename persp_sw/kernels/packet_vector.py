@@ -21,6 +21,7 @@ from .state import (
     RAY_NEAR,
     RED,
     ROUNDER,
+    SECOND,
     TILE,
     VALUE,
 )
@@ -74,7 +75,7 @@ def _sampler(registers, between):
             left = _pick(builder, line, cell - begin)
             right = _pick(builder, line, cell - begin + 1.0)
             value = left + (x - cell) * (right - left)
-            simd.store(builder, simd.where(shown, value, np.nan), state, _section(builder, at, VALUE))
+            simd.store(builder, simd.where(shown, value, np.nan), state, at)
             return context.get_dummy_value()
 
         arguments = (voxels, *[types.int64] * 4, *[types.float32] * 9, lanes, types.int64)
@@ -126,42 +127,58 @@ def sample(
 
 
 @intrinsic
-def _blend(_context, table, origin, scale, last, share, near, far, lanes, at):
+def _blend(_context, table, origin, scale, last, part, near, far, part_2, near_2, far_2, lanes, at):
     def build(context, builder, signature, arguments):
         entries = _pointer(context, builder, signature.args[0], arguments[0])
-        origin, scale, last, part, near, far = (simd.everywhere(builder, scalar) for scalar in arguments[1:7])
-        state, at = _pointer(context, builder, signature.args[7], arguments[7]), arguments[8]
+        state, at = _pointer(context, builder, signature.args[10], arguments[10]), arguments[11]
+        origin, scale, last, *depths = (simd.everywhere(builder, scalar) for scalar in arguments[1:10])
 
         def read(section):
             return simd.load(builder, state, _section(builder, at, section))
 
-        value = read(VALUE)
-        entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
-        entry = simd.where(value.is_number(), entry, 0.0)
-        red, green, blue, extinction = simd.look_up(builder, entries, entry.to_integers())
-        length = (read(RAY_FAR).at_most(far) - read(RAY_NEAR).at_least(near)).at_least(0.0)
-        y = (extinction * (read(LENGTH) * length) * part).at_least(-126.0)
-        shifted = y + float(ROUNDER)
-        f = y - (shifted - float(ROUNDER))
-        *others, q = (float(c) for c in EXP2_COEFFICIENTS)
-        for coefficient in reversed(others):
-            q = f * q + coefficient
-        power = simd.power_of_two(builder, shifted)
-        alpha = (1.0 - power) - power * (f * q)
+        def entry_of(value):
+            entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
+            return simd.where(value.is_number(), entry, 0.0).to_integers()
+
+        def opacity(extinction, part, near, far):
+            length = (read(RAY_FAR).at_most(far) - read(RAY_NEAR).at_least(near)).at_least(0.0)
+            y = (extinction * (read(LENGTH) * length) * part).at_least(-126.0)
+            shifted = y + float(ROUNDER)
+            f = y - (shifted - float(ROUNDER))
+            power = simd.power_of_two(builder, shifted)
+            c1, c2, c3, c4, c5, c6, c7 = (float(c) for c in EXP2_COEFFICIENTS)
+            # Pairs of terms side by side: half as long a chain of operations that wait for one another.
+            square = f * f
+            low, middle = c1 + c2 * f, c3 + c4 * f
+            high = c5 + f * c6 + square * c7
+            q = f * (low + square * (middle + square * high))
+            return (1.0 - power) - power * q
+
+        # Both samples step by step: each alone is one chain of waiting operations (160 → … ns a packet).
+        rows = [entry_of(read(section)) for section in (VALUE, SECOND)]
+        colours = [simd.look_up(builder, entries, row) for row in rows]
+        alphas = [opacity(colour[3], *depths[3 * n : 3 * n + 3]) for n, colour in enumerate(colours)]
         accumulated = read(ALPHA)
-        share = (1.0 - accumulated) * alpha
-        for section, colour in ((RED, red), (GREEN, green), (BLUE, blue)):
-            simd.store(builder, read(section) + share * colour, state, _section(builder, at, section))
+        share = (1.0 - accumulated) * alphas[0]
         accumulated = accumulated + share
+        share_2 = (1.0 - accumulated) * alphas[1]
+        accumulated = accumulated + share_2
+        for channel, section in enumerate((RED, GREEN, BLUE)):
+            colour = read(section) + share * colours[0][channel] + share_2 * colours[1][channel]
+            simd.store(builder, colour, state, _section(builder, at, section))
         simd.store(builder, accumulated, state, _section(builder, at, ALPHA))
         return simd.none(builder, accumulated < read(ENOUGH))
 
-    arguments = (table, *[types.float32] * 6, lanes, types.int64)
+    arguments = (table, *[types.float32] * 9, lanes, types.int64)
     return types.boolean(*arguments), build
 
 
 @inlined_kernel
-def blend(n, table, origin, scale, share, near, far, scratch, cells, lanes, at):
+def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     """See `packet_portable.blend`."""
     last = np.float32(table.shape[0] - 1)
-    return _blend(table, origin, scale, last, share * MINUS_LOG2E, near, far, lanes, at)
+    part, part_2 = slots[0, 2] * MINUS_LOG2E, slots[1, 2] * MINUS_LOG2E
+    return _blend(
+        table, origin, scale, last, part, slots[0, 0], slots[0, 1], part_2, slots[1, 0], slots[1, 1], lanes,
+        at,
+    )  # fmt: skip

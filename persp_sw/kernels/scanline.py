@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import inlined_kernel, kernel, lean_kernel
+from .._jit import inlined_kernel, kernel, lean_kernel, popcount, prefetch
 from .encode import WORD
 from .state import TILE
 
@@ -32,6 +32,7 @@ PLANE_ROWS = 13
 _ONE = np.uint64(1)
 _BITS = np.uint64(WORD - 1)
 _EIGHT = np.uint64(8)
+_LINE = 64  # voxels, a cache line where they are bytes
 
 
 class Level(NamedTuple):
@@ -56,7 +57,7 @@ class Chunk(NamedTuple):
     """Sample planes of a scanline that are looked at together.
 
     queue: int64 [next fine plane, end, next coarse plane, end]. planes: float64 [PLANE_ROWS, CHUNK]. masks:
-    uint64 [CHUNK, words + 1], the visible blocks of each plane's scanline, then zeros. hits: uint64, a byte
+    uint64 [words + 1, CHUNK], the visible blocks of each plane's scanline, then zeros. hits: uint64, a byte
     for each plane, 1 where the tile at work may meet it; flags: the same bytes.
     """
 
@@ -71,7 +72,7 @@ class Chunk(NamedTuple):
 def new_chunk(words):
     """Room for a chunk of scanlines of so many words of blocks."""
     hits = np.zeros(CHUNK // 8, np.uint64)
-    planes, masks = np.empty((PLANE_ROWS, CHUNK), np.float64), np.empty((CHUNK, words + 1), np.uint64)
+    planes, masks = np.empty((PLANE_ROWS, CHUNK), np.float64), np.empty((words + 1, CHUNK), np.uint64)
     return Chunk(np.empty(4, np.int64), planes, masks, hits, hits.view(np.uint8))
 
 
@@ -111,26 +112,38 @@ def _plane_distance(q, face, per_interval, level):
 
 
 @inlined_kernel
+def _prefetch_row(level, j, k):
+    """Ask for the voxels of a scanline, all of them: a miss of the second-level cache takes 100 ns."""
+    last = np.uint64(level.needed.shape[2] - 1)
+    end = level.offsets[j, k, last] + np.int64(popcount(level.needed[j, k, last]) << np.uint64(2))
+    for at in range(level.offsets[j, k, 0], end + _LINE, _LINE):
+        prefetch(level.voxels, at)
+
+
+@inlined_kernel
 def _place_plane(p, q, number, share, t_j, offset_j, face, per_interval, level, chunk):
     """Note sample plane q of a level in column p; returns whether anything in its scanline is visible."""
     planes, masks = chunk.planes, chunk.masks
     distance, k = _plane_distance(q, face, per_interval, level)
     ahead = max(distance, 0.0)
     j = min(max((offset_j + t_j * ahead) / level.factor[1], level.box[2]), level.box[3])
-    row, slice_ = min(np.floor(j), np.ceil(level.box[3]) - 1.0), np.floor(k)
-    at_j, at_k = np.uint64(np.int64(row)), np.uint64(np.int64(slice_))
+    first_row, slice_ = min(np.floor(j), np.ceil(level.box[3]) - 1.0), np.floor(k)
+    at_j, at_k = np.uint64(np.int64(first_row)), np.uint64(np.int64(slice_))
     words = np.uint64(level.visible.shape[2])
     seen = np.uint64(0)
     for w in range(words):
         mask = level.pairs[at_j, at_k, w] if k != slice_ else level.visible[at_j, at_k, w]
-        masks[p, w] = mask
+        masks[w, p] = mask
         seen |= mask
-    for w in range(words, np.uint64(masks.shape[1])):
-        masks[p, w] = np.uint64(0)
+    for w in range(words, np.uint64(masks.shape[0])):
+        masks[w, p] = np.uint64(0)
+    if seen:
+        _prefetch_row(level, at_j, at_k)
+        _prefetch_row(level, at_j + _ONE, at_k)
     planes[NUMBER, p] = q
     planes[DISTANCE, p] = distance
-    planes[ROW, p] = row
-    planes[ROW_WEIGHT, p] = j - row
+    planes[ROW, p] = first_row
+    planes[ROW_WEIGHT, p] = j - first_row
     planes[SLICE, p] = slice_
     planes[SLICE_WEIGHT, p] = k - slice_
     planes[CORNER, p] = (face[OFFSET_I] + face[ORIGIN_I] * ahead) / level.factor[0]
@@ -185,7 +198,7 @@ def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
 def window(masks, p, block):
     """64 bits of plane p's mask, from `block` on."""
     w, s = block >> np.uint64(6), block & _BITS
-    return (masks[p, w] >> s) | ((masks[p, w + _ONE] << _ONE) << (_BITS - s))
+    return (masks[w, p] >> s) | ((masks[w + _ONE, p] << _ONE) << (_BITS - s))
 
 
 @lean_kernel
@@ -195,22 +208,32 @@ def find_hits(pixel, count, stride_mask, beyond, chunk):
     pixel: the tile's first; `stride_mask`: it takes the planes whose number has none of these bits; `beyond`:
     how far outside the box along i its pixels still read the box's border.
     """
+    # Slices of one dimension, or the loop does not become vectors.
     planes, masks, flags = chunk.planes, chunk.masks, chunk.flags
-    many = masks.shape[1] > 2
+    number, corner, step = planes[NUMBER], planes[CORNER], planes[STEP]
+    low, high, words = planes[LOW], planes[HIGH], masks[0]
     centre, across = pixel + 0.5, np.float64(TILE - 1)
     for p in range(np.uint64(count)):
-        low, high = planes[LOW, p], planes[HIGH, p]
-        last_cell = np.ceil(high) - 1.0
-        x_first = planes[CORNER, p] + centre * planes[STEP, p]
-        x_last = x_first + across * planes[STEP, p] + ROUNDING
-        reached = (x_last >= low - beyond) & (x_first <= high + beyond)
-        reached &= (np.int64(planes[NUMBER, p]) & stride_mask) == 0
-        begin = np.uint64(np.int64(min(max(x_first, low), last_cell))) >> np.uint64(2)
-        end = np.uint64(np.int64(min(max(x_last, low), last_cell))) >> np.uint64(2)
-        bits = window(masks, p, begin) if many else masks[p, np.uint64(0)] >> begin
+        last_cell = np.ceil(high[p]) - 1.0
+        x_first = corner[p] + centre * step[p]
+        x_last = x_first + across * step[p] + ROUNDING
+        reached = (x_last >= low[p] - beyond) & (x_first <= high[p] + beyond)
+        reached &= (np.int64(number[p]) & stride_mask) == 0
+        begin = np.uint64(np.int64(min(max(x_first, low[p]), last_cell))) >> np.uint64(2)
+        end = np.uint64(np.int64(min(max(x_last, low[p]), last_cell))) >> np.uint64(2)
         blocks = min(end - begin, _BITS)  # without the first
-        bits &= (np.uint64(2) << blocks) - _ONE
-        # A window of more than 64 blocks may hold more than these bits tell.
-        flags[p] = np.uint8(reached & ((bits != np.uint64(0)) | (end - begin > _BITS)))
+        bits = (words[p] >> (begin & _BITS)) & ((np.uint64(2) << blocks) - _ONE)
+        # A window of more than 64 blocks, or in another word, may hold more than these bits tell.
+        flags[p] = np.uint8(reached & ((bits != np.uint64(0)) | (end > _BITS)))
+    if masks.shape[0] > 2:
+        for p in range(np.uint64(count)):
+            if flags[p]:
+                last_cell = np.ceil(high[p]) - 1.0
+                x_first = corner[p] + centre * step[p]
+                x_last = x_first + across * step[p] + ROUNDING
+                begin = np.uint64(np.int64(min(max(x_first, low[p]), last_cell))) >> np.uint64(2)
+                end = np.uint64(np.int64(min(max(x_last, low[p]), last_cell))) >> np.uint64(2)
+                bits = window(masks, p, begin) & ((np.uint64(2) << min(end - begin, _BITS)) - _ONE)
+                flags[p] = np.uint8((bits != np.uint64(0)) | (end - begin > _BITS))
     for p in range(np.uint64(count), (np.uint64(count) + _EIGHT - _ONE) // _EIGHT * _EIGHT):
         flags[p] = np.uint8(0)

@@ -5,9 +5,12 @@ import numpy as np
 TILE = 16  # pixels in a tile: one 512-bit vector of floats
 
 # Accumulated colour and opacity; the ray's range, counted from `base`; the ray's world length in one slice
-# interval; the opacity at which it stops; the scalar of the sample being composited, NaN where there is none.
-RED, GREEN, BLUE, ALPHA, RAY_NEAR, RAY_FAR, LENGTH, ENOUGH, VALUE = (np.uint64(TILE * n) for n in range(9))
-SECTIONS = 9
+# interval; the opacity at which it stops; the scalars of two samples being composited, NaN where there is
+# none.
+(RED, GREEN, BLUE, ALPHA, RAY_NEAR, RAY_FAR, LENGTH, ENOUGH, VALUE, SECOND) = (
+    np.uint64(TILE * n) for n in range(10)
+)  # fmt: skip
+SECTIONS = 10
 
 # α = 1 − 2^y is taken as 1 − 2^n·(1 + q) with q = 2^f − 1 = f·(c1 + f·(c2 + …)), |f| ≤ ½, the Taylor series
 # of exp(f·ln 2), remainder below 6e-9: no cancellation, so the faintest media keep their relative accuracy.
