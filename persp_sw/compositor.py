@@ -161,7 +161,26 @@ def _level(
     pairs: bool,
 ) -> Level:
     """Level `number` for the kernel; low, high: corners of the shown box, finest level, standard space."""
-    runs = detail.store(number).axis(axis, pairs=pairs)
-    factor = detail.levels.factor(number)[list(STANDARD_AXES[axis])].astype(np.float64)
-    box = np.column_stack([low / factor, high / factor]).ravel()
-    return Level(runs.visible, runs.pairs, runs.needed, runs.offsets, runs.voxels, factor, box, runs.size[2])
+    store, axes = detail.store(number), list(STANDARD_AXES[axis])
+    runs = store.axis(axis, pairs=pairs)
+    factor = detail.levels.factor(number)[axes].astype(np.float64)
+    box = np.column_stack([low / factor, high / factor])
+    visible = store.visible_box()
+    seen = box[1:] if visible is None else _overlap(box[1:], np.column_stack(visible)[axes[1:]])
+    return Level(
+        runs.visible,
+        runs.pairs,
+        runs.needed,
+        runs.offsets,
+        runs.voxels,
+        factor,
+        1 / factor,
+        box.ravel(),
+        seen.ravel(),
+        runs.size[2],
+    )
+
+
+def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Intervals (n, 2) in which both lie."""
+    return np.column_stack([np.maximum(one[:, 0], other[:, 0]), np.minimum(one[:, 1], other[:, 1])])

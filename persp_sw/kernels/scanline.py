@@ -39,8 +39,10 @@ class Level(NamedTuple):
     """The runs of one principal axis of one level of detail.
 
     visible, pairs, needed, offsets, voxels: see `volume.runs.AxisRuns`. factor: float64 (3,), voxels of the
-    volume that one voxel of the level is, along i, j and k. box: float64 [i0, i1, j0, j1, k0, k1], the shown
-    part in the level's voxels; look-ups along i and j are clamped to it. slices: how many.
+    volume that one voxel of the level is, along i, j and k; per_voxel: 1 / factor. box: float64 [i0, i1, j0,
+    j1, k0, k1], the shown
+    part in the level's voxels; look-ups along i and j are clamped to it. seen: float64 [j0, j1, k0, k1], the
+    part of it with anything visible. slices: how many.
     """
 
     visible: np.ndarray
@@ -49,7 +51,9 @@ class Level(NamedTuple):
     offsets: np.ndarray
     voxels: np.ndarray
     factor: np.ndarray
+    per_voxel: np.ndarray
     box: np.ndarray
+    seen: np.ndarray
     slices: np.int64
 
 
@@ -82,16 +86,16 @@ def plane_range(t_j, offset_j, face, near, far, per_interval, level):
 
     near, far: the distances at which the level is wanted.
     """
-    low_j, high_j = level.box[2] * level.factor[1], level.box[3] * level.factor[1]
+    low_j, high_j = level.seen[0] * level.factor[1], level.seen[1] * level.factor[1]
     interval = level.factor[2]
     sign, e_k = face[SIGN], face[EYE_K]
-    # The distances at which the scanline's sheet is in the box, as far as j and k tell.
+    # The distances at which the scanline's sheet is in what can be seen, as far as j and k tell.
     if t_j != 0.0:
         one, other = (low_j - offset_j) / t_j, (high_j - offset_j) / t_j
         near, far = max(near, min(one, other)), min(far, max(one, other))
     elif offset_j < low_j or offset_j > high_j:
         return 0, 0
-    one, other = sign * (level.box[4] * interval - e_k), sign * (level.box[5] * interval - e_k)
+    one, other = sign * (level.seen[2] * interval - e_k), sign * (level.seen[3] * interval - e_k)
     near, far = max(near, min(one, other)), min(far, max(one, other))
     if near > far:
         return 0, 0
@@ -104,10 +108,10 @@ def plane_range(t_j, offset_j, face, near, far, per_interval, level):
 
 
 @inlined_kernel
-def _plane_distance(q, face, per_interval, level):
+def _plane_distance(q, face, spacing, level):
     """Distance and slice coordinate, in the level's voxels, of a level's sample plane q."""
     first_k = 0.0 if face[SIGN] > 0 else level.slices - 1.0
-    k = first_k + face[SIGN] * (q / np.float64(per_interval))
+    k = first_k + face[SIGN] * (q * spacing)
     return face[SIGN] * (k * level.factor[2] - face[EYE_K]), k
 
 
@@ -121,12 +125,12 @@ def _prefetch_row(level, j, k):
 
 
 @inlined_kernel
-def _place_plane(p, q, number, share, t_j, offset_j, face, per_interval, level, chunk):
-    """Note sample plane q of a level in column p; returns whether anything in its scanline is visible."""
+def _place_plane(p, q, number, share, t_j, offset_j, face, spacing, level, chunk):
+    """Note sample plane q of a level in column p if anything in its scanline is visible; returns whether."""
     planes, masks = chunk.planes, chunk.masks
-    distance, k = _plane_distance(q, face, per_interval, level)
+    distance, k = _plane_distance(q, face, spacing, level)
     ahead = max(distance, 0.0)
-    j = min(max((offset_j + t_j * ahead) / level.factor[1], level.box[2]), level.box[3])
+    j = min(max((offset_j + t_j * ahead) * level.per_voxel[1], level.box[2]), level.box[3])
     first_row, slice_ = min(np.floor(j), np.ceil(level.box[3]) - 1.0), np.floor(k)
     at_j, at_k = np.uint64(np.int64(first_row)), np.uint64(np.int64(slice_))
     words = np.uint64(level.visible.shape[2])
@@ -135,25 +139,26 @@ def _place_plane(p, q, number, share, t_j, offset_j, face, per_interval, level, 
         mask = level.pairs[at_j, at_k, w] if k != slice_ else level.visible[at_j, at_k, w]
         masks[w, p] = mask
         seen |= mask
+    if seen == np.uint64(0):
+        return False
     for w in range(words, np.uint64(masks.shape[0])):
         masks[w, p] = np.uint64(0)
-    if seen:
-        _prefetch_row(level, at_j, at_k)
-        _prefetch_row(level, at_j + _ONE, at_k)
+    _prefetch_row(level, at_j, at_k)
+    _prefetch_row(level, at_j + _ONE, at_k)
     planes[NUMBER, p] = q
     planes[DISTANCE, p] = distance
     planes[ROW, p] = first_row
     planes[ROW_WEIGHT, p] = j - first_row
     planes[SLICE, p] = slice_
     planes[SLICE_WEIGHT, p] = k - slice_
-    planes[CORNER, p] = (face[OFFSET_I] + face[ORIGIN_I] * ahead) / level.factor[0]
-    planes[STEP, p] = (face[OFFSET_PITCH] + face[PITCH] * ahead) / level.factor[0]
+    planes[CORNER, p] = (face[OFFSET_I] + face[ORIGIN_I] * ahead) * level.per_voxel[0]
+    planes[STEP, p] = (face[OFFSET_PITCH] + face[PITCH] * ahead) * level.per_voxel[0]
     planes[LOW, p] = level.box[0]
     planes[HIGH, p] = level.box[1]
     planes[INTERVAL, p] = level.factor[2]
     planes[LEVEL, p] = number
     planes[SHARE, p] = share
-    return seen != np.uint64(0)
+    return True
 
 
 @lean_kernel
@@ -163,14 +168,14 @@ def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
     `zone`: the distances from which the coarse level takes over, and at which it has; its share grows
     linearly.
     """
-    queue = chunk.queue
+    queue, spacing = chunk.queue, 1.0 / per_interval
     count = np.uint64(0)
     while count < np.uint64(CHUNK):
         fine_next, coarse_next = np.inf, np.inf
         if queue[0] < queue[1]:
-            fine_next, _ = _plane_distance(queue[0], face, per_interval, fine)
+            fine_next, _ = _plane_distance(queue[0], face, spacing, fine)
         if queue[2] < queue[3]:
-            coarse_next, _ = _plane_distance(queue[2], face, per_interval, coarse)
+            coarse_next, _ = _plane_distance(queue[2], face, spacing, coarse)
         if fine_next <= coarse_next:
             if fine_next == np.inf:
                 break
@@ -179,16 +184,14 @@ def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
                 share = 1.0 - (fine_next - zone[0]) / (zone[1] - zone[0])
             q = queue[0]
             queue[0] += 1
-            if share > 0.0 and _place_plane(
-                count, q, 0.0, share, t_j, offset_j, face, per_interval, fine, chunk
-            ):
+            if share > 0.0 and _place_plane(count, q, 0.0, share, t_j, offset_j, face, spacing, fine, chunk):
                 count += _ONE
         else:
             share = min((coarse_next - zone[0]) / (zone[1] - zone[0]), 1.0)
             q = queue[2]
             queue[2] += 1
             if share > 0.0 and _place_plane(
-                count, q, 1.0, share, t_j, offset_j, face, per_interval, coarse, chunk
+                count, q, 1.0, share, t_j, offset_j, face, spacing, coarse, chunk
             ):
                 count += _ONE
     return np.int64(count)
