@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from . import _jit
 from .arrays import Image
-from .detail_zones import detail_zones
 from .eye_image import EyeImage
+from .geometry.detail_zones import detail_zones
 from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.parts import Part, shown_parts
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
-from .kernels.composite import Table
+from .kernels.composite import Rays, Table
 from .kernels.composite import composite as composite_face
 from .kernels.scanline import Level
 from .optics.classification import Classification
@@ -132,13 +132,16 @@ def _composite(
         # Distances along the axis as half-spaces: D ≥ near and D ≤ far.
         limits = [(0, 0, face.sign, -face.sign * k_0 - zone.near)] * (zone.near > 0)
         limits += [(0, 0, -face.sign, face.sign * k_0 + zone.far)] * (zone.far < np.inf)
-        levels = [zone.fine + n * (zone.blend[0] < np.inf) for n in (0, 1)]
+        levels = [zone.fine, zone.fine + any(zone.share)]
         fine, coarse = (_level(detail, number, face.axis, low, high, per_interval > 1) for number in levels)
         composite_face(
-            geometry,
-            linear.T @ linear,
-            np.array([*half_spaces, *limits], np.float64),
-            np.array(zone.blend),
+            Rays(
+                geometry,
+                linear.T @ linear,
+                np.array([*half_spaces, *limits], np.float64),
+                np.array([zone.near, zone.far]),
+                np.array(zone.share),
+            ),
             per_interval,
             fine,
             coarse,

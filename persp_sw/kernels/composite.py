@@ -48,6 +48,7 @@ from .scanline import (
     SIGN,
     SLICE,
     SLICE_WEIGHT,
+    SLOPE,
     STEEP,
     STEP,
     collect_planes,
@@ -73,6 +74,33 @@ class Table(NamedTuple):
     rows: np.ndarray
     origin: np.float32
     scale: np.float32
+
+
+class Rays(NamedTuple):
+    """The rays of a face, and what of them is shown.
+
+    face
+        float64 [o_i, o_j, offset_pitch, t_0i, t_0j, pitch, e_k, sign, base, least, near]: of the image's
+        corner, the place of its ray at distance 0 and the tangents, with what both grow by a pixel (the
+        first 0 for an eye at a finite place, the second for one at infinity); k at distance 0; which way
+        along k; a distance near the volume from which depths are counted in float32; the least number of
+        samples in an interval (1, 2 or 4); and the world distance before which nothing is shown.
+    metric
+        float64 (3, 3), AᵀA of the linear part A of world_from_standard.
+    half_spaces
+        float64 (n, 4): shown where a·(i, j, k) + a_0 ≥ 0; the box's six included.
+    limits
+        float64 (2,): distances along k between which anything is composited; of `half_spaces`, too.
+    share
+        float64 (2,): the coarse level's share of the extinction at distance D is share[0] + share[1]·D, the
+        fine level's is the rest. Both 0: the fine level only.
+    """
+
+    face: np.ndarray
+    metric: np.ndarray
+    half_spaces: np.ndarray
+    limits: np.ndarray
+    share: np.ndarray
 
 
 class Tiles(NamedTuple):
@@ -104,7 +132,7 @@ def _new_tiles(number):
         np.empty((number, 2), np.float64),
         np.empty(number * TILE * SECTIONS, np.float32),
         np.empty(3 * TILE, np.float64),
-        np.zeros((2, 3), np.float32),
+        np.zeros((2, 4), np.float32),
         np.empty(SCRATCH, np.float32),
         np.empty(TILE, np.int32),
     )
@@ -214,7 +242,8 @@ def _composite_packet(n, p, pixel, near, far, waiting, chunk, level, table, tile
                 at + np.int64(SECOND if waiting else VALUE),
             )  # fmt: skip
             slot = _ONE if waiting else _NONE
-            tiles.slots[slot, 0], tiles.slots[slot, 1], tiles.slots[slot, 2] = near, far, planes[SHARE, p]
+            tiles.slots[slot, 0], tiles.slots[slot, 1] = near, far
+            tiles.slots[slot, 2], tiles.slots[slot, 3] = planes[SHARE, p], planes[SLOPE, p]
             samples += n
             begin = window_end
             if waiting and blend(
@@ -286,10 +315,9 @@ def _composite_tile(
 
 
 @lean_kernel
-def _composite_row(
-    v, face, metric, half_spaces, zone, per_interval, fine, coarse, table, residual, chunk, tiles, out
-):
+def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, tiles, out):
     """One scanline of the face; returns the number of samples taken."""
+    face, share = rays.face, rays.share
     queue, states, strides = chunk.queue, tiles.states, tiles.strides
     t_j = face[ORIGIN_J] + (v + 0.5) * face[PITCH]
     offset_j = face[OFFSET_J] + (v + 0.5) * face[OFFSET_PITCH]
@@ -305,12 +333,14 @@ def _composite_row(
         steepest = max(max(abs(t_left), abs(t_left + TILE * face[PITCH])), abs(t_j))
         wanted = 4 if steepest > 2.0 * STEEP else 2 if steepest > STEEP else 1
         strides[tile] = per_interval // min(max(wanted, np.int64(face[LEAST])), per_interval) - 1
-    queue[0], queue[1] = plane_range(t_j, offset_j, face, 0.0, zone[1], per_interval, fine)
-    queue[2], queue[3] = plane_range(t_j, offset_j, face, zone[0], np.inf, per_interval, coarse)
+    queue[:] = 0
+    queue[0], queue[1] = plane_range(t_j, offset_j, face, rays.limits, per_interval, fine)
+    if share[0] != 0.0 or share[1] != 0.0:
+        queue[2], queue[3] = plane_range(t_j, offset_j, face, rays.limits, per_interval, coarse)
     first_live, end_live = 0, number
     samples = 0
     while first_live < end_live:
-        count = collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
+        count = collect_planes(t_j, offset_j, face, share, per_interval, fine, coarse, chunk)
         if count == 0:
             break
         for tile in range(first_live, end_live):
@@ -325,7 +355,7 @@ def _composite_row(
                 if hit == _NONE:
                     continue
                 states[tile] = _GOING
-                _find_ranges(n, pixel, t_j, offset_j, face, metric, half_spaces, tiles.ranges)
+                _find_ranges(n, pixel, t_j, offset_j, face, rays.metric, rays.half_spaces, tiles.ranges)
                 _start_tile(n, v, pixel, face[BASE], residual, out, tiles, tiles.reach[tile], at)
             taken, done = _composite_tile(
                 n, pixel, per_interval, strides[tile], tiles.reach[tile], face[BASE], chunk, count, fine,
@@ -348,26 +378,13 @@ def _composite_row(
 
 
 @parallel_kernel
-def composite(
-    face, metric, half_spaces, zone, per_interval, fine, coarse, table, residual, workers, samples, out
-):
+def composite(rays, per_interval, fine, coarse, table, residual, workers, samples, out):
     """Composite one face of an eye image behind what `out` already holds.
 
     Parameters
     ----------
-    face
-        float64 [o_i, o_j, offset_pitch, t_0i, t_0j, pitch, e_k, sign, base, least, near]: of the image's
-        corner, the place of its ray at distance 0 and the tangents, with what both grow by a pixel (the
-        first 0 for an eye at a finite place, the second for one at infinity); k at distance 0; which way
-        along k; a distance near the volume from which depths are counted in float32; the least number of
-        samples in an interval (1, 2 or 4); and the world distance before which nothing is shown.
-    metric
-        float64 (3, 3), AᵀA of the linear part A of world_from_standard.
-    half_spaces
-        float64 (n, 4): shown where a·(i, j, k) + a_0 ≥ 0; the box's six included.
-    zone
-        float64 (2,): the fine level serves up to distance zone[0], the coarse one from zone[1] on; between
-        them both, each with its share of the extinction. Both infinite: no coarse level.
+    rays
+        What is composited, and for which eye.
     per_interval
         Sample planes a slice interval at the steepest tile: 1, 2 or 4. More than 1 needs `pairs`.
     fine, coarse
@@ -390,17 +407,5 @@ def composite(
         tiles = _new_tiles(out.shape[1] // TILE)
         for v in range(worker, out.shape[0], workers):
             samples[v] = _composite_row(
-                v,
-                face,
-                metric,
-                half_spaces,
-                zone,
-                per_interval,
-                fine,
-                coarse,
-                table,
-                residual,
-                chunk,
-                tiles,
-                out,
+                v, rays, per_interval, fine, coarse, table, residual, chunk, tiles, out
             )

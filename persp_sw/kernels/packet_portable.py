@@ -77,10 +77,11 @@ def sample(
 
 
 @inlined_kernel
-def _blend_one(n, table, origin, scale, values, share, near, far, scratch, cells, lanes, at):
+def _blend_one(n, table, origin, scale, values, slot, scratch, cells, lanes, at):
     """One of the two samples of `blend`."""
     pixel = np.uint64(at)
-    part = share * MINUS_LOG2E
+    near, far = slot[0], slot[1]
+    share_0, slope = slot[2] * MINUS_LOG2E, slot[3] * (_F(0.5) * MINUS_LOG2E)
     last = _F(table.shape[0] - 1)
     for l in range(np.uint64(n)):  # noqa: E741
         value = lanes[pixel + values + l]
@@ -104,7 +105,8 @@ def _blend_one(n, table, origin, scale, values, share, near, far, scratch, cells
         end = end if end < far else far
         length = end - begin
         length = length if length > _F(0.0) else _F(0.0)
-        y = scratch[extinctions + l] * (lanes[pixel + LENGTH + l] * length) * part
+        share = share_0 + slope * (begin + end)
+        y = scratch[extinctions + l] * (lanes[pixel + LENGTH + l] * length) * share
         y = y if y > _F(-126.0) else _F(-126.0)
         shifted = y + ROUNDER
         f = y - (shifted - ROUNDER)
@@ -112,11 +114,11 @@ def _blend_one(n, table, origin, scale, values, share, near, far, scratch, cells
         power = power_of_two(shifted)
         alpha = (_F(1.0) - power) - power * q
         accumulated = lanes[pixel + ALPHA + l]
-        share = (_F(1.0) - accumulated) * alpha
-        lanes[pixel + RED + l] += share * scratch[red + l]
-        lanes[pixel + GREEN + l] += share * scratch[green + l]
-        lanes[pixel + BLUE + l] += share * scratch[blue + l]
-        accumulated += share
+        covered = (_F(1.0) - accumulated) * alpha
+        lanes[pixel + RED + l] += covered * scratch[red + l]
+        lanes[pixel + GREEN + l] += covered * scratch[green + l]
+        lanes[pixel + BLUE + l] += covered * scratch[blue + l]
+        accumulated += covered
         lanes[pixel + ALPHA + l] = accumulated
         going |= accumulated < lanes[pixel + ENOUGH + l]
     return not going
@@ -126,12 +128,9 @@ def _blend_one(n, table, origin, scale, values, share, near, far, scratch, cells
 def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     """Classify two samples of each pixel, front to back, and lay them under what is there.
 
-    `slots` float32 [2, 3]: [near, far] of the rays that each stands for, counted from `base` as the rays'
-    ranges are, and the share of its extinction. True if no pixel lets enough light through to go on.
+    `slots` float32 [2, 4]: [near, far] of the rays that each stands for, counted from `base` as the rays'
+    ranges are; the share of the extinction at `base`, and how it grows with the distance. True if no pixel
+    lets enough light through to go on.
     """
-    _blend_one(
-        n, table, origin, scale, VALUE, slots[0, 2], slots[0, 0], slots[0, 1], scratch, cells, lanes, at
-    )
-    return _blend_one(
-        n, table, origin, scale, SECOND, slots[1, 2], slots[1, 0], slots[1, 1], scratch, cells, lanes, at
-    )  # fmt: skip
+    _blend_one(n, table, origin, scale, VALUE, slots[0], scratch, cells, lanes, at)
+    return _blend_one(n, table, origin, scale, SECOND, slots[1], scratch, cells, lanes, at)

@@ -29,7 +29,7 @@ from .state import (
 WINDOW = 64  # most voxels of a row that one packet may span: four registers
 _NARROW = 32  # where two registers do
 
-_WORD = ir.IntType(32)
+_NONE, _ONE = np.uint64(0), np.uint64(1)
 
 
 def _pointer(context, builder, array_type, array):
@@ -127,11 +127,15 @@ def sample(
 
 
 @intrinsic
-def _blend(_context, table, origin, scale, last, part, near, far, part_2, near_2, far_2, lanes, at):
+def _blend(_context, table, origin, scale, last, one, other, lanes, at):
     def build(context, builder, signature, arguments):
         entries = _pointer(context, builder, signature.args[0], arguments[0])
-        state, at = _pointer(context, builder, signature.args[10], arguments[10]), arguments[11]
-        origin, scale, last, *depths = (simd.everywhere(builder, scalar) for scalar in arguments[1:10])
+        state, at = _pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
+        origin, scale, last = (simd.everywhere(builder, scalar) for scalar in arguments[1:4])
+        slots = [
+            [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
+            for slot in arguments[4:6]
+        ]
 
         def read(section):
             return simd.load(builder, state, _section(builder, at, section))
@@ -140,9 +144,11 @@ def _blend(_context, table, origin, scale, last, part, near, far, part_2, near_2
             entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
             return simd.where(value.is_number(), entry, 0.0).to_integers()
 
-        def opacity(extinction, part, near, far):
-            length = (read(RAY_FAR).at_most(far) - read(RAY_NEAR).at_least(near)).at_least(0.0)
-            y = (extinction * (read(LENGTH) * length) * part).at_least(-126.0)
+        def opacity(extinction, near, far, share, slope):
+            begin, end = read(RAY_NEAR).at_least(near), read(RAY_FAR).at_most(far)
+            length = (end - begin).at_least(0.0)
+            share = share + slope * (begin + end)
+            y = (extinction * (read(LENGTH) * length) * share).at_least(-126.0)
             shifted = y + float(ROUNDER)
             f = y - (shifted - float(ROUNDER))
             power = simd.power_of_two(builder, shifted)
@@ -154,10 +160,10 @@ def _blend(_context, table, origin, scale, last, part, near, far, part_2, near_2
             q = f * (low + square * (middle + square * high))
             return (1.0 - power) - power * q
 
-        # Both samples step by step: each alone is one chain of waiting operations (160 → … ns a packet).
+        # Both samples side by side, for each alone is one chain of operations that wait for one another.
         rows = [entry_of(read(section)) for section in (VALUE, SECOND)]
         colours = [simd.look_up(builder, entries, row) for row in rows]
-        alphas = [opacity(colour[3], *depths[3 * n : 3 * n + 3]) for n, colour in enumerate(colours)]
+        alphas = [opacity(colour[3], *slots[n]) for n, colour in enumerate(colours)]
         accumulated = read(ALPHA)
         share = (1.0 - accumulated) * alphas[0]
         accumulated = accumulated + share
@@ -169,16 +175,20 @@ def _blend(_context, table, origin, scale, last, part, near, far, part_2, near_2
         simd.store(builder, accumulated, state, _section(builder, at, ALPHA))
         return simd.none(builder, accumulated < read(ENOUGH))
 
-    arguments = (table, *[types.float32] * 9, lanes, types.int64)
+    slot = types.UniTuple(types.float32, 4)
+    arguments = (table, *[types.float32] * 3, slot, slot, lanes, types.int64)
     return types.boolean(*arguments), build
+
+
+@inlined_kernel
+def _slot(slots, n):
+    """A row of `slots`; its share scaled to what 2^y needs, and its slope to the sum of both ends."""
+    slope = slots[n, 3] * (np.float32(0.5) * MINUS_LOG2E)
+    return slots[n, 0], slots[n, 1], slots[n, 2] * MINUS_LOG2E, slope
 
 
 @inlined_kernel
 def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     """See `packet_portable.blend`."""
     last = np.float32(table.shape[0] - 1)
-    part, part_2 = slots[0, 2] * MINUS_LOG2E, slots[1, 2] * MINUS_LOG2E
-    return _blend(
-        table, origin, scale, last, part, slots[0, 0], slots[0, 1], part_2, slots[1, 0], slots[1, 1], lanes,
-        at,
-    )  # fmt: skip
+    return _blend(table, origin, scale, last, _slot(slots, _NONE), _slot(slots, _ONE), lanes, at)

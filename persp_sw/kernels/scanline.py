@@ -23,11 +23,12 @@ CHUNK = 64  # sample planes looked at together; a multiple of 8
 # counted front to back; its distance; in the level's voxels, the scanline and slice before it and the weights
 # of those behind, i of the image's corner, how far apart pixels are along i, and the part of the box along i;
 # how many voxels of the volume one slice interval of the level is; 0 for the fine level, 1 for the coarse;
-# the share of the extinction that it stands for.
+# its share of the extinction at distance BASE, and how that grows with the distance.
 (
     NUMBER, DISTANCE, ROW, ROW_WEIGHT, SLICE, SLICE_WEIGHT, CORNER, STEP, LOW, HIGH, INTERVAL, LEVEL, SHARE,
-) = range(13)  # fmt: skip
-PLANE_ROWS = 13
+    SLOPE,
+) = range(14)  # fmt: skip
+PLANE_ROWS = 14
 
 _ONE = np.uint64(1)
 _BITS = np.uint64(WORD - 1)
@@ -81,11 +82,12 @@ def new_chunk(words):
 
 
 @lean_kernel
-def plane_range(t_j, offset_j, face, near, far, per_interval, level):
+def plane_range(t_j, offset_j, face, limits, per_interval, level):
     """First sample plane of a level that scanline t_j may need, front to back, and the one after the last.
 
-    near, far: the distances at which the level is wanted.
+    limits: the distances between which it is wanted.
     """
+    near, far = limits[0], limits[1]
     low_j, high_j = level.seen[0] * level.factor[1], level.seen[1] * level.factor[1]
     interval = level.factor[2]
     sign, e_k = face[SIGN], face[EYE_K]
@@ -125,7 +127,7 @@ def _prefetch_row(level, j, k):
 
 
 @inlined_kernel
-def _place_plane(p, q, number, share, t_j, offset_j, face, spacing, level, chunk):
+def _place_plane(p, q, number, share, slope, t_j, offset_j, face, spacing, level, chunk):
     """Note sample plane q of a level in column p if anything in its scanline is visible; returns whether."""
     planes, masks = chunk.planes, chunk.masks
     distance, k = _plane_distance(q, face, spacing, level)
@@ -157,16 +159,16 @@ def _place_plane(p, q, number, share, t_j, offset_j, face, spacing, level, chunk
     planes[HIGH, p] = level.box[1]
     planes[INTERVAL, p] = level.factor[2]
     planes[LEVEL, p] = number
-    planes[SHARE, p] = share
+    planes[SHARE, p] = share + slope * face[BASE]
+    planes[SLOPE, p] = slope
     return True
 
 
 @lean_kernel
-def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk):
+def collect_planes(t_j, offset_j, face, share, per_interval, fine, coarse, chunk):
     """Take the next sample planes, front to back, empty ones left out; returns their number.
 
-    `zone`: the distances from which the coarse level takes over, and at which it has; its share grows
-    linearly.
+    `share`: see `composite.composite`.
     """
     queue, spacing = chunk.queue, 1.0 / per_interval
     count = np.uint64(0)
@@ -179,20 +181,16 @@ def collect_planes(t_j, offset_j, face, zone, per_interval, fine, coarse, chunk)
         if fine_next <= coarse_next:
             if fine_next == np.inf:
                 break
-            share = 1.0
-            if fine_next > zone[0]:
-                share = 1.0 - (fine_next - zone[0]) / (zone[1] - zone[0])
             q = queue[0]
             queue[0] += 1
-            if share > 0.0 and _place_plane(count, q, 0.0, share, t_j, offset_j, face, spacing, fine, chunk):
+            if _place_plane(
+                count, q, 0.0, 1.0 - share[0], -share[1], t_j, offset_j, face, spacing, fine, chunk
+            ):
                 count += _ONE
         else:
-            share = min((coarse_next - zone[0]) / (zone[1] - zone[0]), 1.0)
             q = queue[2]
             queue[2] += 1
-            if share > 0.0 and _place_plane(
-                count, q, 1.0, share, t_j, offset_j, face, spacing, coarse, chunk
-            ):
+            if _place_plane(count, q, 1.0, share[0], share[1], t_j, offset_j, face, spacing, coarse, chunk):
                 count += _ONE
     return np.int64(count)
 

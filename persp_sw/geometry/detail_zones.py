@@ -14,26 +14,25 @@ from dataclasses import dataclass
 import numpy as np
 
 _BEGIN, _END = 2.0, 4.0  # voxels a pixel
-_FAR = 1e9  # distance over which the share of an eye at infinity hardly changes
 
 
 @dataclass(frozen=True)
 class Zone:
-    """Distances along the principal axis that two levels serve.
+    """Distances along the principal axis that one level serves, or two.
 
     Attributes
     ----------
     fine
         Number of the finer level; the coarser one is the next.
-    blend
-        Distances from which the coarser level takes over and at which it has; infinite where it is not
-        needed.
+    share
+        (s_0, s_1): the coarser level's share of the extinction at distance D is s_0 + s_1·D; (0, 0): it has
+        none.
     near, far
         Limits of the zone.
     """
 
     fine: int
-    blend: tuple[float, float]
+    share: tuple[float, float]
     near: float
     far: float
 
@@ -47,24 +46,23 @@ def detail_zones(tangent_pitch: float, offset_pitch: float, farthest: float, lev
     if tangent_pitch == 0:
         yield _parallel_zone(offset_pitch, levels)
         return
-    near = 0.0
-    for fine in range(levels):
-        begin, end = (limit * 2.0**fine / tangent_pitch for limit in (_BEGIN, _END))
-        if fine == levels - 1 or begin >= farthest:
-            yield Zone(fine, (np.inf, np.inf), near, np.inf)
+    near, far = 0.0, _BEGIN / tangent_pitch
+    if far >= farthest or levels == 1:
+        yield Zone(0, (0.0, 0.0), 0.0, np.inf)
+        return
+    yield Zone(0, (0.0, 0.0), 0.0, far)
+    for fine in range(levels - 1):
+        near, far = (limit * 2.0**fine / tangent_pitch for limit in (_BEGIN, _END))
+        slope = 1 / (far - near)
+        last = far >= farthest
+        yield Zone(fine, (-near * slope, slope), near, np.inf if last else far)
+        if last:
             return
-        if end >= farthest or fine == levels - 2:
-            yield Zone(fine, (begin, end), near, np.inf)
-            return
-        yield Zone(fine, (begin, end), near, end)
-        near = end
+    yield Zone(levels - 1, (0.0, 0.0), far, np.inf)
 
 
 def _parallel_zone(apart: float, levels: int) -> Zone:
     """For parallel rays, pixels are equally far apart at all distances."""
     fine = int(np.clip(np.floor(np.log2(apart / _BEGIN)), 0, levels - 1))
     share = (apart / 2.0**fine - _BEGIN) / (_END - _BEGIN)
-    if fine == levels - 1 or share <= 0:
-        return Zone(fine, (np.inf, np.inf), 0.0, np.inf)
-    share = min(share, 1.0)
-    return Zone(fine, (-share * _FAR, (1 - share) * _FAR), 0.0, np.inf)
+    return Zone(fine, (float(np.clip(share, 0, 1)) if fine < levels - 1 else 0.0, 0.0), 0.0, np.inf)
