@@ -99,7 +99,7 @@ def test_opaque_functions_take_two_samples_an_interval_of_their_own_accord():
 def test_quality_does_not_change_the_look(quality):
     volume = synthetic_ct(64)
     view = view_of(volume, DIRECTIONS[0], size=(96, 96))
-    settings = Settings(quality=quality, samples_per_interval=2)
+    settings = Settings(quality=quality, samples_per_interval=2, level_of_detail=False)
     renderer = Renderer(volume, TransferFunction(SMOOTH), settings)
     picture, truth = renderer.render(view), reference.render(volume, renderer.transfer, view)
     np.testing.assert_allclose(picture.mean((0, 1)), truth.mean((0, 1)), rtol=0.02)

@@ -325,8 +325,7 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
         0
     ]  # TILE, unknown to the compiler: a known 16 is unrolled before it can be vectorised
     number = states.shape[0]
-    # Pixels whose range begins or ends within half an interval read the nearest voxel of the box.
-    beyond = 0.5 * max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + number * TILE * face[PITCH])) + 0.01
+    steepest_i = max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + number * TILE * face[PITCH]))
     for tile in range(number):
         states[tile] = _FRESH
         t_left = face[ORIGIN_I] + tile * TILE * face[PITCH]
@@ -347,7 +346,7 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
             if states[tile] == _DONE:
                 continue
             pixel, at = tile * TILE, tile * TILE * SECTIONS
-            find_hits(pixel, count, strides[tile], beyond, chunk)
+            find_hits(pixel, count, strides[tile], steepest_i, chunk)
             if states[tile] == _FRESH:
                 hit = _NONE
                 for group in range((count + 7) // 8):

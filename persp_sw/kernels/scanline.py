@@ -23,12 +23,13 @@ CHUNK = 64  # sample planes looked at together; a multiple of 8
 # counted front to back; its distance; in the level's voxels, the scanline and slice before it and the weights
 # of those behind, i of the image's corner, how far apart pixels are along i, and the part of the box along i;
 # how many voxels of the volume one slice interval of the level is; 0 for the fine level, 1 for the coarse;
-# its share of the extinction at distance BASE, and how that grows with the distance.
+# its share of the extinction at distance BASE, and how that grows with the distance; how far a ray of tangent
+# 1 goes along i, in the level's voxels, in one of its slice intervals.
 (
     NUMBER, DISTANCE, ROW, ROW_WEIGHT, SLICE, SLICE_WEIGHT, CORNER, STEP, LOW, HIGH, INTERVAL, LEVEL, SHARE,
-    SLOPE,
-) = range(14)  # fmt: skip
-PLANE_ROWS = 14
+    SLOPE, SLANT,
+) = range(15)  # fmt: skip
+PLANE_ROWS = 15
 
 _ONE = np.uint64(1)
 _BITS = np.uint64(WORD - 1)
@@ -161,6 +162,7 @@ def _place_plane(p, q, number, share, slope, t_j, offset_j, face, spacing, level
     planes[LEVEL, p] = number
     planes[SHARE, p] = share + slope * face[BASE]
     planes[SLOPE, p] = slope
+    planes[SLANT, p] = level.factor[2] * level.per_voxel[0]
     return True
 
 
@@ -203,21 +205,23 @@ def window(masks, p, block):
 
 
 @lean_kernel
-def find_hits(pixel, count, stride_mask, beyond, chunk):
+def find_hits(pixel, count, stride_mask, steepest, chunk):
     """Set the flags of the chunk's planes that a tile may meet.
 
-    pixel: the tile's first; `stride_mask`: it takes the planes whose number has none of these bits; `beyond`:
-    how far outside the box along i its pixels still read the box's border.
+    pixel: the tile's first; `stride_mask`: it takes the planes whose number has none of these bits;
+    `steepest`: the face's largest tangent along i. A ray whose range begins or ends within half an interval
+    of the plane reads the box's border there, though it is outside.
     """
     # Slices of one dimension, or the loop does not become vectors.
     planes, masks, flags = chunk.planes, chunk.masks, chunk.flags
-    number, corner, step = planes[NUMBER], planes[CORNER], planes[STEP]
+    number, corner, step, slant = planes[NUMBER], planes[CORNER], planes[STEP], planes[SLANT]
     low, high, words = planes[LOW], planes[HIGH], masks[0]
     centre, across = pixel + 0.5, np.float64(TILE - 1)
     for p in range(np.uint64(count)):
         last_cell = np.ceil(high[p]) - 1.0
         x_first = corner[p] + centre * step[p]
         x_last = x_first + across * step[p] + ROUNDING
+        beyond = 0.5 * steepest * slant[p] + ROUNDING
         reached = (x_last >= low[p] - beyond) & (x_first <= high[p] + beyond)
         reached &= (np.int64(number[p]) & stride_mask) == 0
         begin = np.uint64(np.int64(min(max(x_first, low[p]), last_cell))) >> np.uint64(2)
