@@ -18,6 +18,8 @@ MODES: dict[str, Changes] = {
     "1 sample": {"samples_per_interval": 1},
     "2 samples": {"samples_per_interval": 2},
     "4 samples": {"samples_per_interval": 4},
+    "pre-integrated": {"preintegrated": True, "samples_per_interval": 1},
+    "pre-integrated, 2 samples": {"preintegrated": True, "samples_per_interval": 2},
     "4 samples, residual 0.0005": {"samples_per_interval": 4, "residual": 0.0005},
 }
 
@@ -28,6 +30,8 @@ ABLATIONS: dict[str, Changes] = {
     "1 sample an interval": {"samples_per_interval": 1},
     "2 samples an interval": {"samples_per_interval": 2},
     "4 samples an interval": {"samples_per_interval": 4},
+    "pre-integrated": {"preintegrated": True},
+    "no levels of detail": {"level_of_detail": False},
     "a face for each axis": {"single_face_tangent": 1.0},
 }
 
