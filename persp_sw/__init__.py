@@ -21,8 +21,10 @@ if TYPE_CHECKING:
     from .settings import Settings
     from .volume.files import load
     from .volume.grid import Volume
+    from .warp.canvas import Canvas
 
 __all__ = [
+    "Canvas",
     "Cut",
     "Eye",
     "EyeImage",
@@ -43,6 +45,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOME = {
+    "Canvas": ".warp.canvas",
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",

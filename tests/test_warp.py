@@ -6,7 +6,8 @@ import twins
 from tolerances import WARP_LINEAR, WARP_TWIN
 from views import DIRECTIONS, random_pose, view_of
 
-from persp_sw import EyeImage, Renderer, Settings, TransferFunction, Volume
+from persp_sw import Canvas, EyeImage, Renderer, Settings, TransferFunction, Volume
+from persp_sw.errors import ViewError
 from persp_sw.geometry.sight import tangents
 from persp_sw.volume.levels import STANDARD_AXES
 from persp_sw.warp.software import warp_eye_image
@@ -114,3 +115,28 @@ def test_threads_change_no_bit():
     view = view_of(volume, DIRECTIONS[0])
     image = eye_image_of(volume, view)
     np.testing.assert_array_equal(warp_eye_image(image, view, 1), warp_eye_image(image, view, 2))
+
+
+def test_a_canvas_holds_the_last_picture_only():
+    """Pictures of different extent, one after the other, as if each were alone; one face and several."""
+    volume = Volume(np.random.default_rng(0).integers(1, 255, (9, 9, 9)).astype(np.uint8))
+    canvas = Canvas(64, 48)
+    for distance, fovy in ((1.2, 70), (4, 30), (0.8, 100), (9, 30), (1.2, 70), (300, 30)):
+        for single in (1.0, 3.0):
+            for towards in DIRECTIONS[:3]:
+                view = view_of(volume, towards, distance, fovy=fovy, size=(64, 48))
+                image = eye_image_of(volume, view, single_face_tangent=single)
+                alone = warp_eye_image(image, view)
+                np.testing.assert_array_equal(warp_eye_image(image, view, out=canvas), alone)
+                shown = np.arange(64)[None] >= canvas.written[:, :1]
+                shown &= np.arange(64)[None] < canvas.written[:, 1:]
+                assert not alone[~shown].any()
+
+
+def test_a_picture_of_another_size_is_refused():
+    volume = Volume(np.full((9, 9, 9), 200, np.uint8))
+    view = view_of(volume, DIRECTIONS[0])
+    image = eye_image_of(volume, view)
+    for out in (Canvas(48, 64), np.zeros((48, 64, 3), np.float32), np.zeros((48, 64, 4))):
+        with pytest.raises(ViewError, match="contiguous"):
+            warp_eye_image(image, view, out=out)

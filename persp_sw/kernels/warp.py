@@ -71,7 +71,7 @@ def _limit(constant, slope, interval):
 
 
 @parallel_kernel
-def warp(face_from_view, borders, sizes, pixels, is_clear, out):
+def warp(face_from_view, borders, sizes, pixels, written, out):
     """Look every pixel's ray up in the face that owns it, bilinearly; nothing outside the faces.
 
     Parameters
@@ -85,8 +85,8 @@ def warp(face_from_view, borders, sizes, pixels, is_clear, out):
         int64 (n, 3): width, height and first pixel in `pixels`.
     pixels
         float32 (total, 4): the faces' pixels, row by row.
-    is_clear
-        Whether `out` holds zeros already.
+    written
+        int64 (height, 2): columns [begin, end) of each row of `out` that may not be 0; overwritten.
     out
         float32 (height, width, 4), overwritten.
     """
@@ -96,9 +96,10 @@ def warp(face_from_view, borders, sizes, pixels, is_clear, out):
         interval = np.empty(2)
         at, below = np.empty(_CHUNK, np.uint64), np.empty(_CHUNK, np.uint64)
         across, down = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
-        alone = len(sizes) == 1
-        if not is_clear and not alone:
-            out[row] = _F(0.0)
+        old_begin, old_end = written[row, 0], written[row, 1]
+        written[row, 0], written[row, 1] = out.shape[1], 0
+        if len(sizes) > 1:
+            out[row, old_begin:old_end] = _F(0.0)
         for face in range(len(sizes)):
             h, width, height = face_from_view[face], sizes[face, 0], sizes[face, 1]
             u_0, v_0, w_0 = h[0, 1] * y + h[0, 2], h[1, 1] * y + h[1, 2], h[2, 1] * y + h[2, 2]
@@ -115,9 +116,11 @@ def warp(face_from_view, borders, sizes, pixels, is_clear, out):
             _limit(last_v * w_0 - v_0, last_v * w_x - v_x, interval)
             begin = np.int64(min(interval[0], np.float64(out.shape[1])))
             end = max(np.int64(max(interval[1], 0.0)), begin)
-            if not is_clear and alone:
-                out[row, :begin] = _F(0.0)
-                out[row, end:] = _F(0.0)
+            if len(sizes) == 1:
+                out[row, old_begin : max(min(begin, old_end), old_begin)] = _F(0.0)
+                out[row, min(max(end, old_begin), old_end) : old_end] = _F(0.0)
+            if begin < end:
+                written[row, 0], written[row, 1] = min(written[row, 0], begin), max(written[row, 1], end)
             for first in range(begin, end, _CHUNK):
                 count = min(end - first, _CHUNK)
                 for n in range(np.uint64(count)):

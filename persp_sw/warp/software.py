@@ -7,34 +7,48 @@ from numpy.typing import NDArray
 
 from .. import _jit
 from ..arrays import Image, Matrix
+from ..errors import ViewError
 from ..eye_image import EyeImage
 from ..geometry.faces import Face
 from ..geometry.parallel import Shear
 from ..geometry.view import View
 from ..kernels.warp import warp
 from ..volume.levels import STANDARD_AXES
+from .canvas import Canvas
 
 
 def warp_eye_image(
-    eye_image: EyeImage, view: View, threads: int | None = None, out: Image | None = None
+    eye_image: EyeImage, view: View, threads: int | None = None, out: Image | Canvas | None = None
 ) -> Image:
     """The picture of `view` from an eye image composited for walls that include the view's.
 
     Returns
     -------
-    (height, width, 4) float32, linear, premultiplied, row 0 on top, no background; `out` if given. A loop
-    that gives its own `out` saves the system's clearing new memory: a third of the time at 1024².
+    (height, width, 4) float32, linear, premultiplied, row 0 on top, no background: of `out`, if given. A loop
+    that draws on one `Canvas` clears no more than the picture before had drawn.
+
+    Raises
+    ------
+    ViewError
+        `out` has another size than the view.
 
     Accuracy: the look-up is bilinear; which ray a pixel looks up is exact to float64 for the eye that the
     image was composited for, whatever the pose.
     """
     width, height = view.size
-    is_clear = out is None
-    if out is None:
-        out = np.zeros((height, width, 4), np.float32)
+    canvas = Canvas(width, height) if out is None else out
+    if not isinstance(canvas, Canvas):
+        canvas = Canvas.over(canvas)
+    pixels = canvas.pixels
+    if pixels.shape != (height, width, 4) or pixels.dtype != np.float32 or not pixels.flags.c_contiguous:
+        raise ViewError(
+            f"the view needs {height} rows of {width} pixels of 4 float32, contiguous; given "
+            f"{pixels.dtype} {pixels.shape}"
+        )
     if not eye_image.faces:
-        out[:] = 0
-        return out
+        pixels[:] = 0
+        canvas.written[:] = 0
+        return pixels
     object_from_world = np.linalg.inv(eye_image.world_from_object)
     faces = eye_image.faces
     _jit.set_threads(threads or _jit.max_threads())
@@ -43,10 +57,10 @@ def warp_eye_image(
         np.array([_borders(face, len(faces), object_from_world, view) for face in faces]),
         np.array([(*face.size, eye_image.offset(number)) for number, face in enumerate(faces)]),
         eye_image.pixels,
-        is_clear,
-        out,
+        canvas.written,
+        pixels,
     )
-    return out
+    return pixels
 
 
 def _face_from_view(face: Face, object_from_world: Matrix, view: View) -> Matrix:
