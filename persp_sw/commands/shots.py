@@ -17,6 +17,7 @@ from ..geometry.regions import Regions
 from ..geometry.view import View
 from ..measure.metrics import compare
 from ..renderer import Renderer
+from ..warp.canvas import Canvas
 from .output import ProgressCall
 
 MIN_FRAMES = 3  # `max_seconds` never stops before
@@ -81,10 +82,10 @@ def time_frames(renderer: Renderer, views: Sequence[View], max_seconds: float | 
     image = renderer.render(views[0])
     timing = Timing(image, dict(renderer.last), 1e3 * (perf_counter() - start))
     timing.encode_ms, timing.compile_ms = timing.last["encode_ms"], timing.last["compile_ms"]
-    begin, timed = perf_counter(), views[1:]
+    begin, timed, canvas = perf_counter(), views[1:], Canvas(*views[-1].size)
     for number, view in enumerate(timed, 1):
         start = perf_counter()
-        timing.image = renderer.render(view)
+        timing.image = renderer.render(view, canvas)
         timing.frame_ms.append(1e3 * (perf_counter() - start))
         timing.last = dict(renderer.last)
         timing.composite_ms.append(timing.last["composite_ms"])
@@ -93,7 +94,7 @@ def time_frames(renderer: Renderer, views: Sequence[View], max_seconds: float | 
         timing.compile_ms += timing.last["compile_ms"]
         if max_seconds is not None and number >= MIN_FRAMES and perf_counter() - begin > max_seconds:
             if number < len(timed):
-                timing.image = renderer.render(timed[-1])
+                timing.image = renderer.render(timed[-1], canvas)
                 timing.last = dict(renderer.last)
             break
     return timing

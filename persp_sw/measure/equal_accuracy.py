@@ -11,6 +11,7 @@ import numpy as np
 from ..geometry.view import View
 from ..renderer import Renderer
 from ..settings import Settings
+from ..warp.canvas import Canvas
 from .metrics import psnr
 from .modes import MODES, available
 
@@ -108,9 +109,9 @@ class _Trial:
     def time(self, quality: float) -> float:
         """Fastest of three frames, milliseconds: enough to choose between modes."""
         self.renderer.settings = replace(self.settings, quality=quality)
-        spent = []
+        spent, canvas = [], Canvas(*self.view.size)
         for _ in range(3):
             start = perf_counter()
-            self.renderer.render(self.view)
+            self.renderer.render(self.view, canvas)
             spent.append(1e3 * (perf_counter() - start))
         return min(spent)
