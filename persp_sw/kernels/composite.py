@@ -9,11 +9,11 @@ with ℓ the world length of the ray in one slice interval: exact for a homogene
 an interval their lengths 2h are in Simpson's proportion 1 : 2, slices first; equal lengths would favour the
 slices, where values are extreme, over the means between them (real CT, opaque: 45.4 instead of 42.4 dB).
 
-Structure, after measurements: one scanline of the image at a time; its planes' runs are projected to tiles of
-16 pixels, so that a tile knows its planes front to back and empty space costs nothing. Planes are taken 64 at
-a time, and no more once all tiles are opaque. In a packet (a tile on a run) the voxel rows are interpolated
-along j (and k) first, over contiguous voxels; then along i; then all 16 pixels are blended as vectors. Pixels
-outside the run are NaN, which the table maps to "nothing".
+Structure, after measurements (`docs/performance.md`): one scanline of the image at a time; sample planes 64
+at a time, and no more once all tiles of 16 pixels are opaque; a tile finds the planes it needs by comparing
+bits. In a packet (a tile on a run) the voxel rows are interpolated along j (and k) first, over contiguous
+voxels; then along i; then two packets are blended as vectors. Pixels outside the run are NaN, which the table
+maps to "nothing".
 """
 
 from typing import NamedTuple
@@ -321,9 +321,7 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
     queue, states, strides = chunk.queue, tiles.states, tiles.strides
     t_j = face[ORIGIN_J] + (v + 0.5) * face[PITCH]
     offset_j = face[OFFSET_J] + (v + 0.5) * face[OFFSET_PITCH]
-    n = tiles.cells.shape[
-        0
-    ]  # TILE, unknown to the compiler: a known 16 is unrolled before it can be vectorised
+    n = tiles.cells.shape[0]  # TILE, but unknown to the compiler: a known 16 is unrolled, not vectorised
     number = states.shape[0]
     steepest_i = max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + number * TILE * face[PITCH]))
     for tile in range(number):
