@@ -56,10 +56,12 @@ def _has_vectors() -> bool:
 VECTORS = _has_vectors()
 
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
-os.environ.setdefault("NUMBA_CACHE_DIR", str(_cache_folder()))
 
 import numba  # noqa: E402
 
+# Not in the environment: a child process may want other kernels, and numba would hand it these.
+if "NUMBA_CACHE_DIR" not in os.environ:
+    numba.config.CACHE_DIR = str(_cache_folder())
 numba.config.THREADING_LAYER = "omp"
 
 from llvmlite import ir  # noqa: E402

@@ -103,11 +103,11 @@ LEVEL_ROUNDING_DEVIATIONS = 5
 # 6e-8 each: 9 · 2 · 6e-8, relative to the largest value.
 PACKET_SAMPLE = 1.1e-6
 
-# The exponent y of α = 1 − 2^y is a product of four float32 numbers, one of them a sum: 6 roundings of 6e-8, and
-# as many in the polynomial and the blending; absolute, and relative to α where nothing lies in front.
+# The exponent y of α = 1 − 2^y is a product of four float32 numbers, one of them a sum: 6 roundings of 6e-8,
+# and as many in the polynomial and the blending; absolute, and relative to α where nothing lies in front.
 PACKET_BLEND = 8e-7
 
-# The same picture by operations that fuse differently: a look-up may fall on the neighbouring entry of the table.
-# Of 8-bit data one entry is (0.25 opacity / 255 values) / 8 entries a value = 1.2e-4 of colour or extinction, in
-# samples that let errors of both signs cancel; more entries tell other data apart.
-PORTABLE_IMAGE = 1.5e-4
+# The same picture by operations that fuse differently: a look-up may fall on the neighbouring table entry. Of
+# 8-bit data one entry is (0.69 extinction / 255 values) / 8 entries a value = 3.4e-4 of a sample, in some of
+# the samples of a ray, which are a tenth of it each and err with either sign.
+PORTABLE_IMAGE = 1e-4

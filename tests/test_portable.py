@@ -1,0 +1,101 @@
+"""Kernels for any processor: chosen by the environment, and their pictures are those of the vector kernels."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samples import ROOT, spawn
+from tolerances import PORTABLE_IMAGE
+from views import DIRECTIONS, view_of
+
+from persp_sw import Renderer, Settings, TransferFunction, Volume, _jit
+
+DTYPES = [np.uint8, np.int16, np.uint16, np.float32]
+HAZE = TransferFunction([(0, (0.2, 0.4, 0.9), 0), (255, (1, 0.7, 0.4), 0.5)], 1.0)
+
+
+def pictures() -> dict[str, np.ndarray]:
+    """Eye images of all voxel types, one and two samples an interval; with two levels of detail for some."""
+    z, y, x = np.indices((12, 14, 80))
+    data = 120 + 100 * np.sin(0.3 * x + 0.2) * np.cos(0.4 * y - 0.3) * np.sin(0.3 * z + 0.7)
+    found = {}
+    for dtype in DTYPES:
+        volume = Volume(data.astype(dtype))
+        for samples in (1, 2):
+            renderer = Renderer(volume, HAZE, Settings(samples_per_interval=samples, residual=0))
+            for number, (towards, quality) in enumerate([(DIRECTIONS[0], 1.0), (DIRECTIONS[3], 0.25)]):
+                renderer.settings = Settings(samples_per_interval=samples, residual=0, quality=quality)
+                view = view_of(volume, towards, distance=0.9)
+                image = renderer.composite(view.eye, [view.wall])
+                found[f"{np.dtype(dtype)}, {samples} samples, view {number}"] = image.pixels
+    return found
+
+
+def child(program: str, *arguments: object, **environment: str) -> str:
+    """What a Python process of its own prints, which sees the tests and the package."""
+    inherited = {name: value for name, value in os.environ.items() if name != "NUMBA_CPU_NAME"}
+    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
+    done = subprocess.run(
+        [sys.executable, "-c", program, *map(str, arguments)],
+        env={**inherited, "PYTHONPATH": path, **environment},
+        capture_output=True,
+        text=True,
+        timeout=900,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+_DRAW = """
+import sys
+import numpy
+import test_portable
+from persp_sw import _jit
+from persp_sw.kernels import composite, packet_portable
+assert not _jit.VECTORS and composite.blend is packet_portable.blend
+numpy.savez(sys.argv[1], **test_portable.pictures())
+"""
+
+
+@pytest.mark.skipif(not _jit.VECTORS, reason="these are the portable kernels already")
+def test_portable_kernels_draw_the_same_pictures(tmp_path: Path):
+    child(_DRAW, tmp_path / "portable.npz", PERSP_SW_KERNELS="portable")
+    portable = np.load(tmp_path / "portable.npz")
+    ours = pictures()
+    assert sorted(portable) == sorted(ours)
+    for name, picture in ours.items():
+        assert picture[:, 3].max() > 0.5, name
+        assert np.abs(picture - portable[name]).max() < PORTABLE_IMAGE, name
+
+
+_TELL = """
+import numba
+from persp_sw import _jit
+print(_jit.VECTORS, numba.config.CACHE_DIR)
+"""
+
+
+def test_the_environment_chooses_and_compiled_kernels_are_kept_apart():
+    """Also where a process that has kernels starts another: that one may not be given them."""
+    portable, where = child(_TELL, PERSP_SW_KERNELS="portable").split()
+    vector, elsewhere = child(_TELL, PERSP_SW_KERNELS="vector").split()
+    assert (portable, vector) == ("False", "True")
+    if "NUMBA_CACHE_DIR" not in os.environ:
+        assert where.endswith("-portable")
+        assert elsewhere.endswith("-vector")
+
+
+def test_numba_compiling_for_another_processor_means_portable():
+    assert child(_TELL, PERSP_SW_KERNELS="", NUMBA_CPU_NAME="generic").startswith("False")
+
+
+def test_a_wrong_choice_is_told(ball_file: Path):
+    done = spawn("render", ball_file, "--size", 16, 16, PERSP_SW_KERNELS="fast")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr == "error: PERSP_SW_KERNELS is 'portable' or 'vector'; given 'fast'\n"
