@@ -1,4 +1,4 @@
-"""Kernels for any processor: chosen by the environment, and their pictures are those of the vector kernels."""
+"""Kernels for any processor: the environment chooses them; their pictures are those of the vector kernels."""
 
 from __future__ import annotations
 
