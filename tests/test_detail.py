@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import twins
-from tolerances import CLOSED_FORM, COMPOSITE_TWIN
+from tolerances import (
+    CLOSED_FORM,
+    COMPOSITE_TWIN,
+    FLICKER,
+    NO_POP,
+    NOISE_BRIGHTNESS,
+    RAMP_BRIGHTNESS,
+    VOXEL_BRIGHTNESS,
+)
 from views import DIRECTIONS, direction, face_view, view_of
 
 from persp_sw import Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
@@ -230,7 +238,7 @@ def test_a_linear_ramp_keeps_its_mean_brightness(axis, quality):
         view = view_of(ramp.volume, towards, distance=1.8, fovy=60)
         image = renderer.composite(view.eye, [view.wall])
         expected = ramp.image(face_view(image, 0))[..., 3].sum()
-        assert abs(image.face_pixels(0)[..., 3].sum() / expected - 1) < 0.005
+        assert abs(image.face_pixels(0)[..., 3].sum() / expected - 1) < RAMP_BRIGHTNESS
     assert len(levels_used(renderer)) > 1
 
 
@@ -239,7 +247,7 @@ def test_noise_of_linear_extinction_keeps_its_mean_brightness(quality):
     volume = noise((65, 65, 65))
     view = view_of(volume, direction(0.3, 0.2, 1), distance=1.8, fovy=60)
     fine = relative_brightness(volume, view, 1.0)
-    assert abs(relative_brightness(volume, view, quality) / fine - 1) < 0.01
+    assert abs(relative_brightness(volume, view, quality) / fine - 1) < NOISE_BRIGHTNESS
 
 
 def test_a_bright_voxel_keeps_its_mean_brightness_wherever_pixels_fall():
@@ -259,7 +267,7 @@ def test_a_bright_voxel_keeps_its_mean_brightness_wherever_pixels_fall():
         expected = -np.log(1 - 0.002) * np.linalg.norm(offset) / distance**3
         ratios.append(brightness(renderer, view) / expected)
     assert len(levels_used(renderer)) > 1
-    assert abs(np.mean(ratios) - 1) < 0.03
+    assert abs(np.mean(ratios) - 1) < VOXEL_BRIGHTNESS
     assert np.std(ratios) < 0.5
 
 
@@ -285,7 +293,7 @@ def test_nothing_pops_where_levels_take_over():
     views = [View.look_at(eye, centre, (0, 1, 0), 35, (32, 32)) for eye in eyes[::10]]
     truth = np.array([reference.render(volume, THIN_HAZE, view) for view in views])
     assert len(levels_used(renderer)) > 2
-    assert ours.max() < 2 * changes(truth).max() / 10
+    assert ours.max() < NO_POP * changes(truth).max() / 10
 
 
 @pytest.mark.parametrize("kind", ["noise", "checkerboard"])
@@ -301,7 +309,7 @@ def test_fine_structure_flickers_less_than_without_levels(kind):
         renderer = renderer_of(volume, THIN_HAZE, quality=0.25, level_of_detail=levels)
         pictures = path_pictures(renderer, eyes, centre, size=(64, 64), fovy=30)
         energy[levels] = np.mean((pictures - pictures.mean(0)) ** 2)
-    assert energy[True] < 0.1 * energy[False]
+    assert energy[True] < FLICKER * energy[False]
 
 
 # --- Work -------------------------------------------------------------------------------------------------

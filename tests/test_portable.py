@@ -94,8 +94,8 @@ def test_numba_compiling_for_another_processor_means_portable():
     assert child(_TELL, PERSP_SW_KERNELS="", NUMBA_CPU_NAME="generic").startswith("False")
 
 
-def test_a_wrong_choice_is_told(ball_file: Path):
-    done = spawn("render", ball_file, "--size", 16, 16, PERSP_SW_KERNELS="fast")
+def test_a_wrong_choice_is_told(ball_file: Path, tmp_path: Path):
+    done = spawn("render", ball_file, "-o", tmp_path / "a.png", PERSP_SW_KERNELS="fast")
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr == "error: PERSP_SW_KERNELS is 'portable' or 'vector'; given 'fast'\n"
