@@ -114,8 +114,8 @@ PORTABLE_IMAGE = 1e-4
 
 # --- Pictures with levels of detail -----------------------------------------------------------------------
 
-# Relative. Coarse end voxels of a ramp are too bright at its foot and too dark at its top, by equal amounts at
-# unequal distances: a quarter of a coarse voxel's rise on half a voxel, of 128.
+# Relative. Coarse end voxels of a ramp are too bright at its foot and too dark at its top, as much but at other
+# distances: a quarter of a coarse voxel's rise on half a voxel, of 128.
 RAMP_BRIGHTNESS = 0.005
 # Pixels five voxels apart see some 250 independent columns of 13 coarse planes or more: 0.58 / √(250 · 13).
 NOISE_BRIGHTNESS = 0.01
@@ -123,8 +123,8 @@ NOISE_BRIGHTNESS = 0.01
 VOXEL_BRIGHTNESS = 0.03
 
 # A step of ours may be so many times the mean step of exact pictures: pixels four voxels apart add their own
-# interpolation's wobble; a level that takes over at once makes a step several times as large.
-NO_POP = 2.0
+# interpolation's wobble, and smooth; 0.8 measured. A level that takes over at once makes over twice the step.
+NO_POP = 1.5
 # Part of the flicker's energy that is left: noise loses (3/8)² or more across the rays at pixels four voxels
 # apart, 0.05 measured; a checkerboard nearly all, 0.01.
 FLICKER = 0.1
