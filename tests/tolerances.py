@@ -114,7 +114,7 @@ PORTABLE_IMAGE = 1e-4
 
 # --- Pictures with levels of detail -----------------------------------------------------------------------
 
-# Relative. Coarse end voxels of a ramp are too bright at its foot and too dark at its top, as much but at other
+# Relative. End voxels of a ramp are too bright at its foot and too dark at its top, as much but at other
 # distances: a quarter of a coarse voxel's rise on half a voxel, of 128.
 RAMP_BRIGHTNESS = 0.005
 # Pixels five voxels apart see some 250 independent columns of 13 coarse planes or more: 0.58 / √(250 · 13).
