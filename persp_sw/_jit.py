@@ -7,7 +7,9 @@ must be set before OpenMP starts: idle workers would otherwise spin and take the
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import inspect
 import os
 import tempfile
 import time
@@ -67,7 +69,7 @@ numba.config.THREADING_LAYER = "omp"
 from llvmlite import ir  # noqa: E402
 from numba import prange, types  # noqa: E402
 from numba.core import event  # noqa: E402
-from numba.extending import intrinsic  # noqa: E402
+from numba.extending import intrinsic, overload  # noqa: E402
 
 __all__ = [
     "VECTORS",
@@ -76,6 +78,7 @@ __all__ = [
     "inlined_kernel",
     "intrinsic",
     "kernel",
+    "kernel_by_type",
     "lean_kernel",
     "max_threads",
     "parallel_kernel",
@@ -98,6 +101,25 @@ parallel_kernel = numba.njit(parallel=True, **_OPTIONS)
 lean_kernel = numba.njit(_nrt=False, **_OPTIONS)
 # An array is passed as eight numbers: a call with ten of them for every packet took longer than the packet.
 inlined_kernel = numba.njit(_nrt=False, forceinline=True, **_OPTIONS)
+
+
+def kernel_by_type(stub):
+    """Decorator: the function below, given the argument types, returns the inlined kernel that `stub` means.
+
+    It has the stub's parameters, and so has the kernel. One caller's body then serves several types, each
+    compiled, and kept on disk, only when it is used.
+    """
+    options = {name: value for name, value in _OPTIONS.items() if name != "cache"}
+
+    def decorate(choose):
+        @functools.wraps(choose)
+        def chosen(*types_):
+            return choose(*types_).py_func
+
+        chosen.__signature__ = inspect.signature(choose)
+        return overload(stub, jit_options={"_nrt": False, "forceinline": True, **options})(chosen)
+
+    return decorate
 
 
 @intrinsic

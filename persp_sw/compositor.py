@@ -16,8 +16,9 @@ from .geometry.faces import EyeGeometry, Face, plan_faces
 from .geometry.parts import Part, shown_parts
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
-from .kernels.composite import Rays, Table
+from .kernels.composite import Rays
 from .kernels.composite import composite as composite_face
+from .kernels.packet import IntegralTable, Table
 from .kernels.scanline import Level
 from .optics.classification import Classification
 from .seams import close_seams
@@ -111,7 +112,9 @@ def _composite(
     volume = detail.volume
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
-    least = settings.samples_per_interval or _enough_samples(classification, linear)
+    least = settings.samples_per_interval
+    if least is None:
+        least = 1 if settings.preintegrated else _enough_samples(classification, linear)
     per_interval = face.samples_per_interval(least)
     low, high = part.low[axes], part.high[axes]
     (o_i, o_j), offset_pitch, (t_i, t_j), pitch, k_0 = face.rays(eye_object[axes])
@@ -120,9 +123,25 @@ def _composite(
         o_i, o_j, k_0 = o_i - t_i * (last - k_0), o_j - t_j * (last - k_0), last
     front, back = (face.sign * (k - k_0) for k in (low[2], high[2])[:: face.sign])
     base = max(front, 0.0)
-    geometry = np.array([o_i, o_j, offset_pitch, t_i, t_j, pitch, k_0, face.sign, base, least, eye.near])
+    geometry = np.array(
+        [
+            o_i,
+            o_j,
+            offset_pitch,
+            t_i,
+            t_j,
+            pitch,
+            k_0,
+            face.sign,
+            base,
+            least,
+            eye.near,
+            settings.preintegrated,
+        ]
+    )
     half_spaces = part.half_spaces[:, [*axes, 3]]
-    table = Table(classification.table, np.float32(classification.origin), np.float32(classification.scale))
+    table = _table(classification, settings.preintegrated)
+    pairs = per_interval > 1 or settings.preintegrated
     samples = np.zeros(out.shape[0], np.int64)
     taken = 0
     _jit.set_threads(threads)
@@ -133,7 +152,7 @@ def _composite(
         limits = [(0, 0, face.sign, -face.sign * k_0 - zone.near)] * (zone.near > 0)
         limits += [(0, 0, -face.sign, face.sign * k_0 + zone.far)] * (zone.far < np.inf)
         levels = [zone.fine, zone.fine + any(zone.share)]
-        fine, coarse = (_level(detail, number, face.axis, low, high, per_interval > 1) for number in levels)
+        fine, coarse = (_level(detail, number, face.axis, low, high, pairs) for number in levels)
         composite_face(
             Rays(
                 geometry,
@@ -153,6 +172,15 @@ def _composite(
         )
         taken += int(samples.sum())
     return taken
+
+
+def _table(classification: Classification, preintegrated: bool) -> Table | IntegralTable:
+    """What kernels need of a transfer function."""
+    mapping = np.float32(classification.origin), np.float32(classification.scale)
+    if preintegrated:
+        integrals = classification.integrals
+        return IntegralTable(integrals.sums, integrals.beyond, *mapping, np.float32(integrals.unit))
+    return Table(classification.table, *mapping)
 
 
 def _level(

@@ -21,6 +21,10 @@ class Settings:
     samples_per_interval
         Samples along the ray in one slice interval: 1, 2 or 4. None: 2 where the transfer function can become
         opaque within an interval, else 1. Steep rays take more on their own.
+    preintegrated
+        Every scalar on a ray counts, not only those at samples: each sample takes the transfer function's
+        mean over the scalars that its piece of the ray runs through. For sharp transfer functions. One sample
+        an interval then is the default.
     residual
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent
@@ -46,6 +50,7 @@ class Settings:
 
     quality: float = 1.0
     samples_per_interval: int | None = None
+    preintegrated: bool = False
     residual: float = 0.005
     single_face_tangent: float = 3.0
     level_of_detail: bool = True

@@ -148,7 +148,8 @@ def assert_equals_twin(image, volume, transfer, regions, samples):
 
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("samples", [1, 2])
-def test_skipping_changes_no_bit(dtype, samples):
+@pytest.mark.parametrize("preintegrated", [False, True])
+def test_skipping_changes_no_bit(dtype, samples, preintegrated):
     rng = np.random.default_rng(3)
     data = rng.integers(0, 60, (20, 24, 40))
     data[5:12, 8:15, 10:30] += 120
@@ -157,10 +158,11 @@ def test_skipping_changes_no_bit(dtype, samples):
     transfer = TransferFunction([(90, (1, 1, 1), 0), (120, (1, 0.5, 0), 0.9), (190, (0, 0, 1), 0)], 1.0)
     for towards in DIRECTIONS:
         view = view_of(volume, towards)
-        kept = composite(volume, transfer, view, samples_per_interval=samples)
+        mode = {"samples_per_interval": samples, "preintegrated": preintegrated}
+        kept = composite(volume, transfer, view, **mode)
         # The same rectangle for both: what can be seen bounds it, so everything is asked for here.
-        full = composite(volume, transfer, view, samples_per_interval=samples, skip_empty=False)
-        skipping = Renderer(volume, transfer, Settings(residual=0, samples_per_interval=samples))
+        full = composite(volume, transfer, view, skip_empty=False, **mode)
+        skipping = Renderer(volume, transfer, Settings(residual=0, **mode))
         skipping.runs._box = np.zeros(3), np.array(volume.size) - 1.0
         same = skipping.composite(view.eye, [view.wall])
         assert same.faces == full.faces

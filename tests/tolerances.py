@@ -40,6 +40,10 @@ CLOSED_FORM = 2e-6
 # (0.5 opacity / 255 values) / 8 entries a value = 2.5e-4 of extinction for 8-bit data, in few samples.
 COMPOSITE_TWIN = 3e-4
 
+# Two pre-integrated samples, one of whose ends may fall on the next row: of two rows or more, the mean
+# changes by less than half of the test's steepest step, 0.51 of extinction / 5 values / 8 rows = 0.013, times 1/2.
+PREINTEGRATED_KERNELS = 0.01
+
 # Two float32 computations of the same image in another order: a few dozen roundings of 6e-8 …
 # and, rarely, the neighbouring table entry, as above.
 FLOAT32_IMAGE = 3e-4

@@ -55,6 +55,7 @@ comes before them. --quality and --samples change speed and error, never the loo
 @click.option(
     "--intermediate", type=int, metavar="N", help="Pixels of the eye image's longer side; replaces --quality."
 )
+@click.option("--preintegrated", is_flag=True, help="All values on a ray count, not only those at samples.")
 @setting_options
 @view_options
 @region_options
@@ -66,6 +67,7 @@ def render(
     judge: bool,
     tolerance: float,
     intermediate: int | None,
+    preintegrated: bool,
     quality: float,
     samples: str | None,
     residual: float,
@@ -86,6 +88,7 @@ def render(
         settings = Settings(
             quality=quality,
             samples_per_interval=int(samples) if samples else chosen.samples_per_interval,
+            preintegrated=preintegrated,
             residual=residual,
             threads=threads,
             intermediate_size=intermediate,
@@ -120,6 +123,7 @@ def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, prog
         "preset": scene.preset.name if scene.preset else None,
         "quality": settings.quality,
         "samples_per_interval": settings.samples_per_interval,
+        "preintegrated": settings.preintegrated,
         **timing.report(),
         "dense_bytes": volume.data.nbytes,
     }

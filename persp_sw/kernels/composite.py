@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import VECTORS, inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
+from .._jit import inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
 from .encode import BLOCK, packed_position
-from .packet_portable import SCRATCH, WINDOW
+from .packet import SCRATCH, WINDOW, blend, sample
 from .scanline import (
     BASE,
     CORNER,
@@ -33,6 +33,7 @@ from .scanline import (
     LEAST,
     LEVEL,
     LOW,
+    MIDDLE,
     NEAR,
     NUMBER,
     OFFSET_I,
@@ -59,32 +60,20 @@ from .scanline import (
 )
 from .state import ALPHA, ENOUGH, LENGTH, RAY_FAR, RAY_NEAR, SECOND, SECTIONS, TILE, VALUE
 
-if VECTORS:
-    from .packet_vector import blend, sample
-else:
-    from .packet_portable import blend, sample
-
 _F = np.float32
 _NONE, _ONE, _BLOCK = np.uint64(0), np.uint64(1), np.uint64(BLOCK)
-
-
-class Table(NamedTuple):
-    """A transfer function; see `optics.classification.Classification`."""
-
-    rows: np.ndarray
-    origin: np.float32
-    scale: np.float32
 
 
 class Rays(NamedTuple):
     """The rays of a face, and what of them is shown.
 
     face
-        float64 [o_i, o_j, offset_pitch, t_0i, t_0j, pitch, e_k, sign, base, least, near]: of the image's
-        corner, the place of its ray at distance 0 and the tangents, with what both grow by a pixel (the
-        first 0 for an eye at a finite place, the second for one at infinity); k at distance 0; which way
-        along k; a distance near the volume from which depths are counted in float32; the least number of
-        samples in an interval (1, 2 or 4); and the world distance before which nothing is shown.
+        float64 [o_i, o_j, offset_pitch, t_0i, t_0j, pitch, e_k, sign, base, least, near, middle]: of the
+        image's corner, the place of its ray at distance 0 and the tangents, with what both grow by a pixel
+        (the first 0 for an eye at a finite place, the second for one at infinity); k at distance 0; which
+        way along k; a distance near the volume from which depths are counted in float32; the least number of
+        samples in an interval (1, 2 or 4); the world distance before which nothing is shown; and 1 where
+        planes lie in the middle of equal pieces of an interval, as an `IntegralTable` wants them, else 0.
     metric
         float64 (3, 3), AᵀA of the linear part A of world_from_standard.
     half_spaces
@@ -106,7 +95,8 @@ class Rays(NamedTuple):
 class Tiles(NamedTuple):
     """A scanline's tiles: what they have accumulated, and room to work.
 
-    states [tile]; strides [tile]: a tile takes the planes whose number has none of these bits; reach [tile,
+    states [tile]; strides [tile]: a tile takes the planes whose number has none of these bits, or the highest
+    alone where planes lie in the middle; reach [tile,
     2]: nearest and farthest distance of any of its pixels; lanes: `SECTIONS` of 16 floats a tile; ranges,
     slots, scratch, cells: of the tile at work.
     """
@@ -199,7 +189,7 @@ def _start_tile(n, v, pixel, base, residual, out, tiles, reach, at):
 
 
 @inlined_kernel
-def _composite_packet(n, p, pixel, near, far, waiting, chunk, level, table, tiles, at):
+def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, table, tiles, at):
     """A tile on plane p, which stands for [near, far] of each ray.
 
     Samples are blended two at a time. `waiting`: whether one waits for the next. Returns the samples taken,
@@ -216,6 +206,15 @@ def _composite_packet(n, p, pixel, near, far, waiting, chunk, level, table, tile
     end = np.uint64(np.int64(min(max(x_last, low), last_cell))) + _ONE
     j, k = np.uint64(planes[ROW, p]), np.uint64(planes[SLICE, p])
     weight_j, weight_k = _F(planes[ROW_WEIGHT, p]), _F(planes[SLICE_WEIGHT, p])
+    path = (
+        _F((face[ORIGIN_I] + (pixel + 0.5) * face[PITCH]) * level.per_voxel[0]),
+        _F(face[PITCH] * level.per_voxel[0]),
+        _F(t_j * level.per_voxel[1]),
+        _F(face[SIGN] * level.per_voxel[2]),
+        _F(max(planes[DISTANCE, p], 0.0) - face[BASE]),
+        near,
+        far,
+    )
     samples = 0
     block = first // _BLOCK
     while block * _BLOCK < end:
@@ -238,17 +237,15 @@ def _composite_packet(n, p, pixel, near, far, waiting, chunk, level, table, tile
             sample(
                 n, np.int64(window_end - begin) + 1, level.voxels, at_00, at_10, at_01, at_11, weight_j,
                 weight_k, _F(x_first - start), _F(step), _F(low - start), _F(high - start),
-                _F(last_cell - start), _F(begin - first), _F(window_end - first), scratch, cells, lanes,
-                at + np.int64(SECOND if waiting else VALUE),
+                _F(last_cell - start), _F(begin - first), _F(window_end - first), path, table, scratch, cells,
+                lanes, at, SECOND if waiting else VALUE,
             )  # fmt: skip
             slot = _ONE if waiting else _NONE
             tiles.slots[slot, 0], tiles.slots[slot, 1] = near, far
             tiles.slots[slot, 2], tiles.slots[slot, 3] = planes[SHARE, p], planes[SLOPE, p]
             samples += n
             begin = window_end
-            if waiting and blend(
-                n, table.rows, table.origin, table.scale, tiles.slots, scratch, cells, lanes, at
-            ):
+            if waiting and blend(n, table, tiles.slots, scratch, cells, lanes, at):
                 return samples, False, True
             waiting = not waiting
         block = until
@@ -260,20 +257,18 @@ def _blend_last(n, table, tiles, at):
     """Blend a sample that waits for another in vain; returns whether all is opaque."""
     for l in range(np.uint64(n)):  # noqa: E741
         tiles.lanes[np.uint64(at) + SECOND + l] = _F(np.nan)
-    return blend(
-        n, table.rows, table.origin, table.scale, tiles.slots, tiles.scratch, tiles.cells, tiles.lanes, at
-    )
+    return blend(n, table, tiles.slots, tiles.scratch, tiles.cells, tiles.lanes, at)
 
 
 @lean_kernel
 def _composite_tile(
-    n, pixel, per_interval, stride_mask, reach, base, chunk, count, fine, coarse, table, tiles, at
+    n, pixel, per_interval, stride_mask, reach, t_j, face, chunk, count, fine, coarse, table, tiles, at
 ):
     """A tile through the planes of a chunk that it hits; returns samples taken and whether it is done.
 
     `reach`: the nearest and the farthest distance that any of its pixels shows.
     """
-    planes, nearest, farthest = chunk.planes, reach[0], reach[1]
+    planes, nearest, farthest, base = chunk.planes, reach[0], reach[1], face[BASE]
     stride = stride_mask + 1
     samples, waiting, done = 0, False, False
     for group in range((count + 7) // 8):
@@ -283,7 +278,9 @@ def _composite_tile(
             flags &= flags - _ONE
             distance = planes[DISTANCE, p]
             half = 0.5
-            if stride < per_interval:
+            if face[MIDDLE] != 0.0:
+                half = stride / (4.0 * per_interval)
+            elif stride < per_interval:
                 on_even = np.int64(planes[NUMBER, p]) & stride == 0
                 half = (1.0 if on_even else 2.0) * stride / (3.0 * per_interval)
             half *= planes[INTERVAL, p]
@@ -298,11 +295,11 @@ def _composite_tile(
             near, far = _F(distance - half - base), _F(distance + half - base)
             if planes[LEVEL, p] == 0.0:
                 taken, waiting, done = _composite_packet(
-                    n, p, pixel, near, far, waiting, chunk, fine, table, tiles, at
+                    n, p, pixel, near, far, waiting, t_j, face, chunk, fine, table, tiles, at
                 )
             else:
                 taken, waiting, done = _composite_packet(
-                    n, p, pixel, near, far, waiting, chunk, coarse, table, tiles, at
+                    n, p, pixel, near, far, waiting, t_j, face, chunk, coarse, table, tiles, at
                 )
             samples += taken
             if done:
@@ -323,28 +320,32 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
     offset_j = face[OFFSET_J] + (v + 0.5) * face[OFFSET_PITCH]
     n = tiles.cells.shape[0]  # TILE, but unknown to the compiler: a known 16 is unrolled, not vectorised
     number = states.shape[0]
+    middle = face[MIDDLE] != 0.0
+    planes_per_interval = 2 * per_interval if middle else per_interval
     steepest_i = max(abs(face[ORIGIN_I]), abs(face[ORIGIN_I] + number * TILE * face[PITCH]))
     for tile in range(number):
         states[tile] = _FRESH
         t_left = face[ORIGIN_I] + tile * TILE * face[PITCH]
         steepest = max(max(abs(t_left), abs(t_left + TILE * face[PITCH])), abs(t_j))
         wanted = 4 if steepest > 2.0 * STEEP else 2 if steepest > STEEP else 1
-        strides[tile] = per_interval // min(max(wanted, np.int64(face[LEAST])), per_interval) - 1
+        stride = per_interval // min(max(wanted, np.int64(face[LEAST])), per_interval)
+        strides[tile] = (2 * stride if middle else stride) - 1
     queue[:] = 0
-    queue[0], queue[1] = plane_range(t_j, offset_j, face, rays.limits, per_interval, fine)
+    queue[0], queue[1] = plane_range(t_j, offset_j, face, rays.limits, planes_per_interval, fine)
     if share[0] != 0.0 or share[1] != 0.0:
-        queue[2], queue[3] = plane_range(t_j, offset_j, face, rays.limits, per_interval, coarse)
+        queue[2], queue[3] = plane_range(t_j, offset_j, face, rays.limits, planes_per_interval, coarse)
     first_live, end_live = 0, number
     samples = 0
     while first_live < end_live:
-        count = collect_planes(t_j, offset_j, face, share, per_interval, fine, coarse, chunk)
+        count = collect_planes(t_j, offset_j, face, share, planes_per_interval, fine, coarse, chunk)
         if count == 0:
             break
         for tile in range(first_live, end_live):
             if states[tile] == _DONE:
                 continue
             pixel, at = tile * TILE, tile * TILE * SECTIONS
-            find_hits(pixel, count, strides[tile], steepest_i, chunk)
+            phase = (strides[tile] + 1) // 2 if middle else 0
+            find_hits(pixel, count, strides[tile], phase, steepest_i, chunk)
             if states[tile] == _FRESH:
                 hit = _NONE
                 for group in range((count + 7) // 8):
@@ -355,7 +356,7 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
                 _find_ranges(n, pixel, t_j, offset_j, face, rays.metric, rays.half_spaces, tiles.ranges)
                 _start_tile(n, v, pixel, face[BASE], residual, out, tiles, tiles.reach[tile], at)
             taken, done = _composite_tile(
-                n, pixel, per_interval, strides[tile], tiles.reach[tile], face[BASE], chunk, count, fine,
+                n, pixel, per_interval, strides[tile], tiles.reach[tile], t_j, face, chunk, count, fine,
                 coarse, table, tiles, at,
             )  # fmt: skip
             samples += taken
@@ -387,7 +388,7 @@ def composite(rays, per_interval, fine, coarse, table, residual, workers, sample
     fine, coarse
         `scanline.Level`.
     table
-        Transfer function.
+        Transfer function: `packet.Table`, or `packet.IntegralTable`, which needs `pairs` and MIDDLE.
     residual
         A packet stops when all its pixels let through no more than this.
     workers

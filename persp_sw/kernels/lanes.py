@@ -44,6 +44,12 @@ class Floats:
 
     __rmul__ = __mul__
 
+    def __truediv__(self, other):
+        return self._new(self.builder.fdiv(self.value, self._other(other), flags=_CONTRACT))
+
+    def __rtruediv__(self, other):
+        return self._new(self.builder.fdiv(self._other(other), self.value, flags=_CONTRACT))
+
     def __lt__(self, other):
         return self.builder.fcmp_ordered("<", self.value, self._other(other))
 
@@ -131,15 +137,32 @@ def look_up(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value) -> list[Floa
 
     16 loads of a row each and a transpose: a gather of every column costs two to four times as much.
     """
-    loaded = []
-    for lane in range(TILE):
-        row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
-        at = builder.gep(table, [builder.shl(row, ir.Constant(_INT64, 2))])
-        address = builder.bitcast(at, ir.VectorType(_FLOAT, 4).as_pointer())
-        loaded.append(builder.load(address, align=4))
+    loaded = [_row(builder, table, rows, lane) for lane in range(TILE)]
+    return [Floats(builder, column) for column in _transposed(builder, loaded)]
+
+
+def look_up_differences(
+    builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, others: ir.Value
+) -> list[Floats]:
+    """The four columns of `others` less those of `rows`, of a table with four int32 a row."""
+    pairs = [[_row(builder, table, which, lane) for which in (others, rows)] for lane in range(TILE)]
+    columns = _transposed(builder, [builder.sub(*pair) for pair in pairs])
+    return [Floats(builder, builder.sitofp(column, _FLOATS)) for column in columns]
+
+
+def _row(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, lane: int) -> ir.Value:
+    """The four numbers of row rows[lane]."""
+    row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
+    at = builder.gep(table, [builder.shl(row, ir.Constant(_INT64, 2))])
+    address = builder.bitcast(at, ir.VectorType(table.type.pointee, 4).as_pointer())
+    return builder.load(address, align=4)
+
+
+def _transposed(builder: ir.IRBuilder, rows: list[ir.Value]) -> list[ir.Value]:
+    """Sixteen rows of four as four columns of sixteen."""
     quarters = []  # [m]: the rows of lanes m, 4 + m, 8 + m and 12 + m, one in each 128 bits
     for m in range(4):
-        halves = [shuffle(builder, loaded[m + q], loaded[m + q + 4], list(range(8))) for q in (0, 8)]
+        halves = [shuffle(builder, rows[m + q], rows[m + q + 4], list(range(8))) for q in (0, 8)]
         quarters.append(shuffle(builder, *halves, list(range(16))))
     columns = []
     for high in (0, 2):  # columns 0 and 1, then 2 and 3
@@ -150,7 +173,7 @@ def look_up(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value) -> list[Floa
             order_2 = [
                 n + q for q in (0, 4, 8, 12) for n in (first, first + 1, first + TILE, first + 1 + TILE)
             ]
-            columns.append(Floats(builder, shuffle(builder, front, back, order_2)))
+            columns.append(shuffle(builder, front, back, order_2))
     return columns
 
 

@@ -26,8 +26,8 @@ from .state import (
 )
 
 WINDOW = 64  # most voxels of a row that one packet may span
-_CHUNK = 32  # rows are interpolated so many voxels at a time, beyond their ends
-SCRATCH = WINDOW + _CHUNK  # floats
+CHUNK = 32  # rows are interpolated so many voxels at a time, beyond their ends
+SCRATCH = WINDOW + CHUNK  # floats
 
 _F = np.float32
 _ONE = np.uint64(1)
@@ -47,7 +47,7 @@ def sample(
     where `weight_k` is 0. `last_cell`: the box's last, to which x at the box's end belongs. `scratch`
     (SCRATCH floats) and `cells` (16 int32) hold nothing. Result in lanes[at …].
     """
-    length = (width + _CHUNK - 1) // _CHUNK * _CHUNK  # whole vectors: what is read beyond the run is not used
+    length = (width + CHUNK - 1) // CHUNK * CHUNK  # whole vectors: what is read beyond the run is not used
     if weight_k == _F(0.0):
         for i in range(length):
             above, below = _F(voxels[np.uint64(at_00 + i)]), _F(voxels[np.uint64(at_10 + i)])

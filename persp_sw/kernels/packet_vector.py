@@ -27,17 +27,24 @@ from .state import (
 )
 
 WINDOW = 64  # most voxels of a row that one packet may span: four registers
-_NARROW = 32  # where two registers do
+NARROW = 32  # where two registers do
 
 _NONE, _ONE = np.uint64(0), np.uint64(1)
 
 
-def _pointer(context, builder, array_type, array):
+def pointer(context, builder, array_type, array):
+    """An array's first element."""
     return context.make_array(array_type)(context, builder, array).data
 
 
-def _section(builder, at, section):
-    return builder.add(at, ir.Constant(ir.IntType(64), int(section)))
+def word(number):
+    """A 64-bit constant."""
+    return ir.Constant(ir.IntType(64), int(number))
+
+
+def section_at(builder, at, section):
+    """Where the tile's `section` begins."""
+    return builder.add(at, word(section))
 
 
 def _sampler(registers, between):
@@ -51,15 +58,15 @@ def _sampler(registers, between):
         signed = getattr(voxels.dtype, "signed", True)
 
         def build(context, builder, signature, arguments):
-            data = _pointer(context, builder, signature.args[0], arguments[0])
+            data = pointer(context, builder, signature.args[0], arguments[0])
             starts, scalars = arguments[1:5], arguments[5:14]
-            state, at = _pointer(context, builder, signature.args[14], arguments[14]), arguments[15]
+            state, at = pointer(context, builder, signature.args[14], arguments[14]), arguments[15]
             weight_j, weight_k, x, step, low, high, last_cell, begin, end = (
                 simd.everywhere(builder, scalar) for scalar in scalars
             )
 
             def row(start, register):
-                return simd.load(builder, data, _section(builder, start, TILE * register), signed=signed)
+                return simd.load(builder, data, section_at(builder, start, TILE * register), signed=signed)
 
             line = []
             for register in range(registers):
@@ -72,8 +79,8 @@ def _sampler(registers, between):
             x = (simd.constant(builder, list(range(TILE))) * step + x).at_least(low).at_most(high)
             cell = x.floor().at_most(last_cell)
             shown = builder.and_(cell >= begin, cell < end)
-            left = _pick(builder, line, cell - begin)
-            right = _pick(builder, line, cell - begin + 1.0)
+            left = pick(builder, line, cell - begin)
+            right = pick(builder, line, cell - begin + 1.0)
             value = left + (x - cell) * (right - left)
             simd.store(builder, simd.where(shown, value, np.nan), state, at)
             return context.get_dummy_value()
@@ -84,7 +91,7 @@ def _sampler(registers, between):
     return sample_window
 
 
-def _pick(builder, line, place):
+def pick(builder, line, place):
     """line[place] of a row of 32 or 64 numbers in registers."""
     index = place.to_integers()
     result = simd.permute(builder, line[0], line[1], index)
@@ -104,7 +111,7 @@ def sample(
 ):  # fmt: skip
     """See `packet_portable.sample`."""
     if weight_k == np.float32(0.0):
-        if width <= _NARROW:
+        if width <= NARROW:
             _on_slice(
                 voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
                 end, lanes, at,
@@ -114,7 +121,7 @@ def sample(
                 voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
                 end, lanes, at,
             )  # fmt: skip
-    elif width <= _NARROW:
+    elif width <= NARROW:
         _between(
             voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell, begin,
             end, lanes, at,
@@ -126,54 +133,74 @@ def sample(
         )  # fmt: skip
 
 
+class Tile:
+    """A tile's state in memory, and two samples laid under it."""
+
+    def __init__(self, builder, state, at):
+        self.builder, self.state, self.at = builder, state, at
+
+    def read(self, section):
+        """16 floats of the tile's `section`."""
+        return simd.load(self.builder, self.state, section_at(self.builder, self.at, section))
+
+    def write(self, values, section):
+        """16 floats to the tile's `section`."""
+        simd.store(self.builder, values, self.state, section_at(self.builder, self.at, section))
+
+    def opacity(self, extinction, near, far, share, slope):
+        """Of what is left of [near, far] in the range of each ray; see `packet_portable.blend`."""
+        begin, end = self.read(RAY_NEAR).at_least(near), self.read(RAY_FAR).at_most(far)
+        length = (end - begin).at_least(0.0)
+        share = share + slope * (begin + end)
+        y = (extinction * (self.read(LENGTH) * length) * share).at_least(-126.0)
+        shifted = y + float(ROUNDER)
+        f = y - (shifted - float(ROUNDER))
+        power = simd.power_of_two(self.builder, shifted)
+        c1, c2, c3, c4, c5, c6, c7 = (float(c) for c in EXP2_COEFFICIENTS)
+        # Pairs of terms side by side: half as long a chain of operations that wait for one another.
+        square = f * f
+        low, middle = c1 + c2 * f, c3 + c4 * f
+        high = c5 + f * c6 + square * c7
+        q = f * (low + square * (middle + square * high))
+        return (1.0 - power) - power * q
+
+    def blend(self, colours, slots):
+        """Lay samples of these colours and extinctions under what is there; whether all pixels are done.
+
+        Both side by side, for each alone is one chain of operations that wait for one another.
+        """
+        alphas = [self.opacity(colour[3], *slots[n]) for n, colour in enumerate(colours)]
+        accumulated = self.read(ALPHA)
+        share = (1.0 - accumulated) * alphas[0]
+        accumulated = accumulated + share
+        share_2 = (1.0 - accumulated) * alphas[1]
+        accumulated = accumulated + share_2
+        for channel, section in enumerate((RED, GREEN, BLUE)):
+            colour = self.read(section) + share * colours[0][channel] + share_2 * colours[1][channel]
+            self.write(colour, section)
+        self.write(accumulated, ALPHA)
+        return simd.none(self.builder, accumulated < self.read(ENOUGH))
+
+
 @intrinsic
 def _blend(_context, table, origin, scale, last, one, other, lanes, at):
     def build(context, builder, signature, arguments):
-        entries = _pointer(context, builder, signature.args[0], arguments[0])
-        state, at = _pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
+        entries = pointer(context, builder, signature.args[0], arguments[0])
+        state, at = pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
         origin, scale, last = (simd.everywhere(builder, scalar) for scalar in arguments[1:4])
         slots = [
             [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
             for slot in arguments[4:6]
         ]
 
-        def read(section):
-            return simd.load(builder, state, _section(builder, at, section))
-
         def entry_of(value):
             entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
             return simd.where(value.is_number(), entry, 0.0).to_integers()
 
-        def opacity(extinction, near, far, share, slope):
-            begin, end = read(RAY_NEAR).at_least(near), read(RAY_FAR).at_most(far)
-            length = (end - begin).at_least(0.0)
-            share = share + slope * (begin + end)
-            y = (extinction * (read(LENGTH) * length) * share).at_least(-126.0)
-            shifted = y + float(ROUNDER)
-            f = y - (shifted - float(ROUNDER))
-            power = simd.power_of_two(builder, shifted)
-            c1, c2, c3, c4, c5, c6, c7 = (float(c) for c in EXP2_COEFFICIENTS)
-            # Pairs of terms side by side: half as long a chain of operations that wait for one another.
-            square = f * f
-            low, middle = c1 + c2 * f, c3 + c4 * f
-            high = c5 + f * c6 + square * c7
-            q = f * (low + square * (middle + square * high))
-            return (1.0 - power) - power * q
-
-        # Both samples side by side, for each alone is one chain of operations that wait for one another.
-        rows = [entry_of(read(section)) for section in (VALUE, SECOND)]
+        tile = Tile(builder, state, at)
+        rows = [entry_of(tile.read(section)) for section in (VALUE, SECOND)]
         colours = [simd.look_up(builder, entries, row) for row in rows]
-        alphas = [opacity(colour[3], *slots[n]) for n, colour in enumerate(colours)]
-        accumulated = read(ALPHA)
-        share = (1.0 - accumulated) * alphas[0]
-        accumulated = accumulated + share
-        share_2 = (1.0 - accumulated) * alphas[1]
-        accumulated = accumulated + share_2
-        for channel, section in enumerate((RED, GREEN, BLUE)):
-            colour = read(section) + share * colours[0][channel] + share_2 * colours[1][channel]
-            simd.store(builder, colour, state, _section(builder, at, section))
-        simd.store(builder, accumulated, state, _section(builder, at, ALPHA))
-        return simd.none(builder, accumulated < read(ENOUGH))
+        return tile.blend(colours, slots)
 
     slot = types.UniTuple(types.float32, 4)
     arguments = (table, *[types.float32] * 3, slot, slot, lanes, types.int64)
@@ -181,7 +208,7 @@ def _blend(_context, table, origin, scale, last, one, other, lanes, at):
 
 
 @inlined_kernel
-def _slot(slots, n):
+def slot_of(slots, n):
     """A row of `slots`; its share scaled to what 2^y needs, and its slope to the sum of both ends."""
     slope = slots[n, 3] * (np.float32(0.5) * MINUS_LOG2E)
     return slots[n, 0], slots[n, 1], slots[n, 2] * MINUS_LOG2E, slope
@@ -191,4 +218,4 @@ def _slot(slots, n):
 def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     """See `packet_portable.blend`."""
     last = np.float32(table.shape[0] - 1)
-    return _blend(table, origin, scale, last, _slot(slots, _NONE), _slot(slots, _ONE), lanes, at)
+    return _blend(table, origin, scale, last, slot_of(slots, _NONE), slot_of(slots, _ONE), lanes, at)

@@ -17,7 +17,9 @@ ROUNDING = 0.01  # voxels that float32 may place a pixel too far along i
 CHUNK = 64  # sample planes looked at together; a multiple of 8
 
 # `face`, see `composite.composite`.
-(OFFSET_I, OFFSET_J, OFFSET_PITCH, ORIGIN_I, ORIGIN_J, PITCH, EYE_K, SIGN, BASE, LEAST, NEAR) = range(11)
+(
+    OFFSET_I, OFFSET_J, OFFSET_PITCH, ORIGIN_I, ORIGIN_J, PITCH, EYE_K, SIGN, BASE, LEAST, NEAR, MIDDLE,
+) = range(12)  # fmt: skip
 
 # Rows of `planes`, one column for each sample plane of the chunk that is not empty: its number in its level,
 # counted front to back; its distance; in the level's voxels, the scanline and slice before it and the weights
@@ -119,6 +121,15 @@ def _plane_distance(q, face, spacing, level):
 
 
 @inlined_kernel
+def _next_middle(q, per_interval, face):
+    """The next plane, `q` or later, that is the middle of a piece for LEAST samples an interval or more.
+
+    With m samples those are the odd multiples of per_interval / 2m.
+    """
+    return q + 1 if q & (per_interval // np.int64(face[LEAST]) - 1) == 0 else q
+
+
+@inlined_kernel
 def _prefetch_row(level, j, k):
     """Ask for the voxels of a scanline, all of them: a miss of the second-level cache takes 100 ns."""
     last = np.uint64(level.needed.shape[2] - 1)
@@ -133,7 +144,8 @@ def _place_plane(p, q, number, share, slope, t_j, offset_j, face, spacing, level
     planes, masks = chunk.planes, chunk.masks
     distance, k = _plane_distance(q, face, spacing, level)
     ahead = max(distance, 0.0)
-    j = min(max((offset_j + t_j * ahead) * level.per_voxel[1], level.box[2]), level.box[3])
+    unclamped = (offset_j + t_j * ahead) * level.per_voxel[1]
+    j = min(max(unclamped, level.box[2]), level.box[3])
     first_row, slice_ = min(np.floor(j), np.ceil(level.box[3]) - 1.0), np.floor(k)
     at_j, at_k = np.uint64(np.int64(first_row)), np.uint64(np.int64(slice_))
     words = np.uint64(level.visible.shape[2])
@@ -154,6 +166,9 @@ def _place_plane(p, q, number, share, slope, t_j, offset_j, face, spacing, level
     planes[ROW_WEIGHT, p] = j - first_row
     planes[SLICE, p] = slice_
     planes[SLICE_WEIGHT, p] = k - slice_
+    if face[MIDDLE] != 0.0:  # the scalar there is followed along the ray, so it must be on the ray
+        planes[ROW_WEIGHT, p] = unclamped - first_row
+        planes[SLICE_WEIGHT, p] += face[SIGN] * (ahead - distance) * level.per_voxel[2]
     planes[CORNER, p] = (face[OFFSET_I] + face[ORIGIN_I] * ahead) * level.per_voxel[0]
     planes[STEP, p] = (face[OFFSET_PITCH] + face[PITCH] * ahead) * level.per_voxel[0]
     planes[LOW, p] = level.box[0]
@@ -175,6 +190,9 @@ def collect_planes(t_j, offset_j, face, share, per_interval, fine, coarse, chunk
     queue, spacing = chunk.queue, 1.0 / per_interval
     count = np.uint64(0)
     while count < np.uint64(CHUNK):
+        if face[MIDDLE] != 0.0:
+            queue[0] = _next_middle(queue[0], per_interval, face)
+            queue[2] = _next_middle(queue[2], per_interval, face)
         fine_next, coarse_next = np.inf, np.inf
         if queue[0] < queue[1]:
             fine_next, _ = _plane_distance(queue[0], face, spacing, fine)
@@ -205,10 +223,10 @@ def window(masks, p, block):
 
 
 @lean_kernel
-def find_hits(pixel, count, stride_mask, steepest, chunk):
+def find_hits(pixel, count, stride_mask, phase, steepest, chunk):
     """Set the flags of the chunk's planes that a tile may meet.
 
-    pixel: the tile's first; `stride_mask`: it takes the planes whose number has none of these bits;
+    pixel: the tile's first; `stride_mask`: it takes the planes whose number has `phase` in these bits;
     `steepest`: the face's largest tangent along i. A ray whose range begins or ends within half an interval
     of the plane reads the box's border there, though it is outside.
     """
@@ -223,7 +241,7 @@ def find_hits(pixel, count, stride_mask, steepest, chunk):
         x_last = x_first + across * step[p] + ROUNDING
         beyond = 0.5 * steepest * slant[p] + ROUNDING
         reached = (x_last >= low[p] - beyond) & (x_first <= high[p] + beyond)
-        reached &= (np.int64(number[p]) & stride_mask) == 0
+        reached &= (np.int64(number[p]) & stride_mask) == phase
         begin = np.uint64(np.int64(min(max(x_first, low[p]), last_cell))) >> np.uint64(2)
         end = np.uint64(np.int64(min(max(x_last, low[p]), last_cell))) >> np.uint64(2)
         blocks = min(end - begin, _BITS)  # without the first

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..volume.grid import Volume
+from .preintegration import Preintegration
 from .transfer import TransferFunction
 
 # Entries per grey level of 8-bit data; 2,041 entries of 16 bytes stay in the first-level cache.
@@ -58,6 +60,11 @@ class Classification:
         table[1:, 3] = np.minimum(transfer.extinction(values), _LARGEST)
         seen = np.concatenate([[0], np.cumsum(table[:, 3] > 0)]).astype(np.int64)
         return cls(table, seen, origin, scale)
+
+    @cached_property
+    def integrals(self) -> Preintegration:
+        """The table's integrals, made when they are first asked for."""
+        return Preintegration.of(self.table)
 
     @property
     def largest_extinction(self) -> float:

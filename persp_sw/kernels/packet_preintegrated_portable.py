@@ -1,0 +1,176 @@
+"""Pre-integrated packets, plain numba: each sample stands for a piece of its ray, all of whose scalars count.
+
+The plane lies in the middle of the piece. In the sample's cell the scalar s is trilinear; along the ray it is
+taken as linear, with its slope in the plane,
+    ds/dD = t_i·∂s/∂i + t_j·∂s/∂j + sign·∂s/∂k,
+from one end of what the ray's range leaves of the piece to the other, and never beyond the cell's smallest
+and largest corner: what a cell cannot show does not show. The piece's extinction is the mean over the table's
+rows from one end's to the other's; its colour is their mean colour, weighted by extinction. Integral
+functions (Engel, Kraus, Ertl 2001) give both for any length; that the piece's front dims its back is
+neglected in its colour, not in its opacity.
+"""
+
+import numpy as np
+
+from .._jit import inlined_kernel, power_of_two
+from .packet_portable import CHUNK
+from .packet_portable import SCRATCH as LINE
+from .state import (
+    ALPHA,
+    BLUE,
+    ENOUGH,
+    EXP2_COEFFICIENTS,
+    FAR_ROW,
+    GREEN,
+    LENGTH,
+    MINUS_LOG2E,
+    RAY_FAR,
+    RAY_NEAR,
+    RED,
+    ROUNDER,
+    SECOND,
+    VALUE,
+    VALUE_END,
+)
+
+_F = np.float32
+_NONE, _ONE, _TWO, _THREE = np.uint64(0), np.uint64(1), np.uint64(2), np.uint64(3)
+_LINE = np.uint64(LINE)
+_NAN = _F(np.nan)
+_END = VALUE_END - VALUE  # from a sample's section to the one with its end
+_C1, _C2, _C3, _C4, _C5, _C6, _C7 = EXP2_COEFFICIENTS
+
+
+@inlined_kernel
+def sample(
+    n, width, voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell,
+    begin, end, path, table, scratch, cells, lanes, at, section,
+):  # fmt: skip
+    """Table rows that the piece of each ray covers: the first in `section`, NaN outside cells begin … end − 1
+    and where a voxel is missing; the one after the last in the section's end.
+
+    As `packet_portable.sample` but for: x + l·step, where the ray meets the plane, picks its cell clamped to
+    [low, high] but not its place in it; `path` float32 [t_i of lane 0, its growth a lane, t_j, sign], in the
+    level's voxels a distance, [the plane's distance, near, far] of the piece, counted from `base`; `scratch`
+    4·SCRATCH floats.
+    """
+    t_first, t_step, t_j, towards, plane, near, far = path
+    values, slopes = np.uint64(0), _LINE
+    smallest, largest = _TWO * _LINE, _THREE * _LINE
+    length = (width + CHUNK - 1) // CHUNK * CHUNK
+    for voxel in range(length):
+        i = np.uint64(voxel)
+        a, b = _F(voxels[np.uint64(at_00 + voxel)]), _F(voxels[np.uint64(at_10 + voxel)])
+        c, d = _F(voxels[np.uint64(at_01 + voxel)]), _F(voxels[np.uint64(at_11 + voxel)])
+        front, back = a + weight_j * (b - a), c + weight_j * (d - c)
+        along_k = back - front
+        along_j = (b - a) + weight_k * ((d - c) - (b - a))
+        scratch[values + i] = front + weight_k * along_k
+        scratch[slopes + i] = t_j * along_j + towards * along_k
+        low_front, low_back = a if a < b else b, c if c < d else d
+        high_front, high_back = a if a > b else b, c if c > d else d
+        scratch[smallest + i] = low_front if low_front < low_back else low_back
+        scratch[largest + i] = high_front if high_front > high_back else high_back
+    first, after = np.uint64(at) + section, np.uint64(at) + section + _END
+    for l in range(np.uint64(n)):  # noqa: E741
+        place = x + _F(l) * step
+        inside = place if place > low else low
+        inside = inside if inside < high else high
+        cell = np.floor(inside)
+        cell = cell if cell < last_cell else last_cell
+        lanes[first + l] = place - cell if cell >= begin and cell < end else _NAN
+        cell = cell if cell > begin else begin
+        cell = cell if cell < end else begin
+        cells[l] = np.int32(cell - begin)
+    origin, scale = table.origin, table.scale
+    for l in range(np.uint64(n)):  # noqa: E741
+        left = np.uint64(np.uint32(cells[l]))
+        right = left + _ONE
+        weight = lanes[first + l]
+        along_i = scratch[right] - scratch[left]
+        value = scratch[left] + weight * along_i
+        slope = scratch[slopes + left] + weight * (scratch[slopes + right] - scratch[slopes + left])
+        slope += (t_first + _F(l) * t_step) * along_i
+        least, other = scratch[smallest + left], scratch[smallest + right]
+        least = least if least < other else other
+        most, other = scratch[largest + left], scratch[largest + right]
+        most = most if most > other else other
+        begins, ends = lanes[np.uint64(at) + RAY_NEAR + l], lanes[np.uint64(at) + RAY_FAR + l]
+        begins = begins if begins > near else near
+        ends = ends if ends < far else far
+        one, two = value + slope * (begins - plane), value + slope * (ends - plane)
+        lower, upper = one if one < two else two, one if one > two else two
+        lower = lower if lower > least else least
+        lower = lower if lower < most else most
+        upper = upper if upper > least else least
+        upper = upper if upper < most else most
+        row = (lower - origin) * scale + _F(1.5)
+        row = row if row > -FAR_ROW else -FAR_ROW
+        row = row if row < FAR_ROW else FAR_ROW
+        end_row = (upper - origin) * scale + _F(1.5)
+        end_row = end_row if end_row > -FAR_ROW else -FAR_ROW
+        end_row = end_row if end_row < FAR_ROW else FAR_ROW
+        lanes[first + l] = np.floor(row) if value == value else _NAN
+        lanes[after + l] = np.floor(end_row) + _F(1.0)
+
+
+@inlined_kernel
+def _blend_one(n, sums, beyond, unit, section, slot, scratch, lanes, at):
+    """One of the two samples of `blend`."""
+    pixel = np.uint64(at)
+    near, far = slot[0], slot[1]
+    share_0, slope = slot[2] * (MINUS_LOG2E * unit), slot[3] * (_F(0.5) * MINUS_LOG2E * unit)
+    end = _F(sums.shape[0] - 1)
+    red, green, blue, extinctions = np.uint64(0), np.uint64(n), np.uint64(2 * n), np.uint64(3 * n)
+    for l in range(np.uint64(n)):  # noqa: E741
+        first = lanes[pixel + section + l]
+        there = first == first
+        first = first if there else _F(1.0)
+        after = lanes[pixel + section + _END + l] if there else _F(1.0)
+        low = min(max(first, _F(1.0)), end)
+        high = min(max(after, _F(1.0)), end)
+        below = max(min(after, _F(1.0)) - first, _F(0.0))
+        above = max(after - max(first, end), _F(0.0))
+        row, next_row = np.uint64(low), np.uint64(high)
+        for channel in range(4):
+            inside = _F(sums[next_row, np.uint64(channel)] - sums[row, np.uint64(channel)])
+            outside = below * beyond[_NONE, np.uint64(channel)] + above * beyond[_ONE, np.uint64(channel)]
+            scratch[np.uint64(n * channel) + l] = inside + outside
+    going = False
+    for l in range(np.uint64(n)):  # noqa: E741
+        first = lanes[pixel + section + l]
+        count = lanes[pixel + section + _END + l] - first if first == first else _F(1.0)
+        extinction = scratch[extinctions + l]
+        extinction = extinction if extinction > _F(1.0) else _F(1.0)
+        reciprocal = _F(1.0) / (extinction * count)  # one division for both quotients
+        begins, ends = lanes[pixel + RAY_NEAR + l], lanes[pixel + RAY_FAR + l]
+        begins = begins if begins > near else near
+        ends = ends if ends < far else far
+        length = ends - begins
+        length = length if length > _F(0.0) else _F(0.0)
+        share = share_0 + slope * (begins + ends)
+        mean = scratch[extinctions + l] * (extinction * reciprocal)
+        y = mean * (lanes[pixel + LENGTH + l] * length) * share
+        y = y if y > _F(-126.0) else _F(-126.0)
+        shifted = y + ROUNDER
+        f = y - (shifted - ROUNDER)
+        q = f * (_C1 + f * (_C2 + f * (_C3 + f * (_C4 + f * (_C5 + f * (_C6 + f * _C7))))))
+        power = power_of_two(shifted)
+        alpha = (_F(1.0) - power) - power * q
+        accumulated = lanes[pixel + ALPHA + l]
+        covered = (_F(1.0) - accumulated) * alpha
+        weight = covered * (count * reciprocal)
+        lanes[pixel + RED + l] += weight * scratch[red + l]
+        lanes[pixel + GREEN + l] += weight * scratch[green + l]
+        lanes[pixel + BLUE + l] += weight * scratch[blue + l]
+        accumulated += covered
+        lanes[pixel + ALPHA + l] = accumulated
+        going |= accumulated < lanes[pixel + ENOUGH + l]
+    return not going
+
+
+@inlined_kernel
+def blend(n, table, slots, scratch, cells, lanes, at):
+    """As `packet_portable.blend`, of the rows that `sample` left."""
+    _blend_one(n, table.sums, table.beyond, table.unit, VALUE, slots[0], scratch, lanes, at)
+    return _blend_one(n, table.sums, table.beyond, table.unit, SECOND, slots[1], scratch, lanes, at)
