@@ -41,7 +41,8 @@ CLOSED_FORM = 2e-6
 COMPOSITE_TWIN = 3e-4
 
 # Two pre-integrated samples, one of whose ends may fall on the next row: of two rows or more, the mean
-# changes by less than half of the test's steepest step, 0.51 of extinction / 5 values / 8 rows = 0.013, times 1/2.
+# changes by less than half of the test's steepest step, 0.51 of extinction / 5 values / 8 rows = 0.013,
+# times 1/2.
 PREINTEGRATED_KERNELS = 0.01
 
 # Two float32 computations of the same image in another order: a few dozen roundings of 6e-8 …
