@@ -56,8 +56,8 @@ import sys
 import numpy
 import test_portable
 from persp_sw import _jit
-from persp_sw.kernels import composite, packet_portable
-assert not _jit.VECTORS and composite.blend is packet_portable.blend
+from persp_sw.kernels import packet, packet_portable
+assert not _jit.VECTORS and packet.classified is packet_portable
 numpy.savez(sys.argv[1], **test_portable.pictures())
 """
 
