@@ -28,7 +28,7 @@ from .volume.levels import STANDARD_AXES
 from .volume.runs import RunStore
 
 # Optical depth of one interval beyond which a single sample hides all that follows (5 % are left).
-_OPAQUE = 3.0
+OPAQUE_DEPTH = 3.0
 
 
 def composite_eye(
@@ -94,7 +94,7 @@ def _enough_samples(classification: Classification, linear: NDArray[np.float64])
     On a real CT with opacities up to 1 the second sample gains 10 dB at 1.6 to 1.9 times the time; doubling
     the picture's resolution, at three times the time, gains nothing there.
     """
-    return 2 if classification.largest_extinction * np.linalg.norm(linear[:, 2]) > _OPAQUE else 1
+    return 2 if classification.largest_extinction * np.linalg.norm(linear[:, 2]) > OPAQUE_DEPTH else 1
 
 
 def _composite(

@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _jit
+from ..compositor import OPAQUE_DEPTH
 from ..eye_image import EyeImage
 from ..geometry.regions import Regions
 from ..geometry.view import View, Wall
 from ..kernels.count import count_samples
+from ..kernels.scanline import STEEP
 from ..optics.transfer import MAX_OPACITY, TransferFunction
 from ..settings import Settings
 from ..volume.grid import Volume
 from ..volume.levels import STANDARD_AXES, standard_rows
 
-STEEP = 1.5  # tangents beyond which a ray takes two samples an interval, twice this: four (docs/design.md)
-OPAQUE_DEPTH = 3.0  # optical depth of an interval from which two samples are the default
 RAYS = 1 << 16  # of larger faces about so many are looked at, evenly spread
 
 
