@@ -16,6 +16,7 @@ from .geometry.view import Eye, View, Wall
 from .optics.classification import Classification
 from .optics.presets import choose
 from .optics.transfer import TransferFunction
+from .sampling import choose_sampling
 from .settings import Settings
 from .volume.detail import DetailStore
 from .volume.grid import Volume
@@ -53,7 +54,7 @@ class Renderer:
     last
         Statistics of the last picture: `encode_ms`, `composite_ms`, `warp_ms`, `compile_ms` (numba; not in
         the others), `faces`, `intermediate_size` (width and height of the largest face), `samples`,
-        `runs_bytes`, `threads`.
+        `samples_per_interval` and `preintegrated` (how rays were sampled), `runs_bytes`, `threads`.
     """
 
     def __init__(
@@ -70,8 +71,8 @@ class Renderer:
         self.last: dict[str, Any] = {}
         self._transfer = transfer or choose(volume).transfer
         self._classification = Classification.of(self._transfer, volume)
-        self.detail = DetailStore(volume, self._visibility(), progress)
-        self._skipping = self.settings.skip_empty
+        self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
+        self.detail = DetailStore(volume, self._visibility(), progress, self._stored())
         if min(volume.size) == 1:
             _log.warning(
                 "%s is one voxel thick: the box of its voxel centres holds nothing, the picture is empty",
@@ -92,7 +93,7 @@ class Renderer:
     def transfer(self, transfer: TransferFunction | None) -> None:
         self._transfer = transfer or choose(self.volume).transfer
         self._classification = Classification.of(self._transfer, self.volume)
-        self.detail.classify(self._visibility())
+        self.detail.classify(self._visibility(), self._stored())
 
     def composite(self, eye: Eye, walls: Sequence[Wall], previous: EyeImage | None = None) -> EyeImage:
         """One eye image that serves all `walls`; the eye may be anywhere, inside the volume too.
@@ -103,9 +104,9 @@ class Renderer:
 
         Cost: one compositing, whatever the number of walls; none where no wall shows anything visible.
         """
-        if self._skipping != self.settings.skip_empty:
-            self._skipping = self.settings.skip_empty
-            self.detail.classify(self._visibility())
+        if (self._skipping, self._packing) != (self.settings.skip_empty, self.settings.pack_runs):
+            self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
+            self.detail.classify(self._visibility(), self._stored())
         compiled, encoded = _jit.compile_seconds(), self.detail.encode_seconds
         start = perf_counter()
         image = composite_eye(
@@ -129,6 +130,7 @@ class Renderer:
                 max((f.size for f in image.faces), key=lambda s: s[0] * s[1], default=(0, 0))
             ),
             "samples": image.samples,
+            **choose_sampling(self.settings, self._classification, self.volume)._asdict(),
             "runs_bytes": self.detail.bytes,
             "threads": self.settings.threads or _jit.max_threads(),
         }
@@ -160,3 +162,6 @@ class Renderer:
 
     def _visibility(self) -> Classification | EverythingVisible:
         return self._classification if self.settings.skip_empty else EverythingVisible()
+
+    def _stored(self) -> EverythingVisible | None:
+        return None if self.settings.pack_runs else EverythingVisible()

@@ -19,12 +19,11 @@ class Settings:
         Pixels of the intermediate image per pixel that the view or the volume asks for, 0.05 … 8.
         1: one pixel a voxel on the nearest visible slice, or fewer where the walls cannot show so many.
     samples_per_interval
-        Samples along the ray in one slice interval: 1, 2 or 4. None: 2 where the transfer function can become
-        opaque within an interval, else 1. Steep rays take more on their own.
+        Samples along the ray in one slice interval: 1, 2 or 4. None: 1. Steep rays take more on their own.
     preintegrated
         Every scalar on a ray counts, not only those at samples: each sample takes the transfer function's
-        mean over the scalars that its piece of the ray runs through. For sharp transfer functions. One sample
-        an interval then is the default.
+        mean over the scalars that its piece of the ray runs through. None: where the transfer function can
+        become opaque within an interval and `samples_per_interval` is None, too.
     residual
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent
@@ -32,7 +31,10 @@ class Settings:
     level_of_detail
         Take coarser voxels where pixels are more than two voxels apart, which would alias and cost more.
     skip_empty
-        Leave out what the transfer function makes invisible. Changes no pixel; off only for measuring.
+        Leave out what the transfer function makes invisible. Changes no pixel of a face, but faces are as
+        large as the whole volume asks for without; off only for measuring.
+    pack_runs
+        Store visible voxels alone. Changes no pixel; off only for measuring.
     intermediate_size
         Pixels of the largest face's longer side, 16 … `max_intermediate`; `quality` then does nothing. Up to
         four fewer, for pixels have their places; a width is a multiple of 16.
@@ -50,11 +52,12 @@ class Settings:
 
     quality: float = 1.0
     samples_per_interval: int | None = None
-    preintegrated: bool = False
+    preintegrated: bool | None = None
     residual: float = 0.005
     single_face_tangent: float = 3.0
     level_of_detail: bool = True
     skip_empty: bool = True
+    pack_runs: bool = True
     max_intermediate: int = 4096
     intermediate_size: int | None = None
     threads: int | None = None

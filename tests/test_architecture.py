@@ -25,6 +25,7 @@ RANKS = {
     "persp_sw.optics": 2,
     "persp_sw.geometry": 2,
     "persp_sw.eye_image": 3,
+    "persp_sw.sampling": 3,
     "persp_sw.seams": 3,
     "persp_sw.compositor": 3,
     "persp_sw.warp": 3,

@@ -85,14 +85,33 @@ def test_error_falls_with_quality_and_samples():
     assert errors[-1] > 53  # rms 2e-3
 
 
-def test_opaque_functions_take_two_samples_an_interval_of_their_own_accord():
+def test_opaque_functions_are_preintegrated_of_their_own_accord():
     volume = synthetic_ct(48)
     view = view_of(volume, DIRECTIONS[0], size=(64, 64))
-    for points, samples in ((SMOOTH, 1), ([*SURFACE[:2], (130, (0.9, 0.7, 0.5), 1.0)], 2)):
+    for points, opaque in ((SMOOTH, False), ([*SURFACE[:2], (130, (0.9, 0.7, 0.5), 1.0)], True)):
         renderer = Renderer(volume, TransferFunction(points))
         picture = renderer.render(view)
-        renderer.settings = Settings(samples_per_interval=samples)
-        np.testing.assert_array_equal(renderer.render(view), picture)
+        assert renderer.last["samples_per_interval"] == 1
+        assert renderer.last["preintegrated"] is opaque
+        for settings, same in (
+            (Settings(samples_per_interval=1, preintegrated=opaque), True),
+            (Settings(samples_per_interval=1, preintegrated=not opaque), False),
+            (Settings(samples_per_interval=1), not opaque),  # who asks for samples gets samples
+        ):
+            renderer.settings = settings
+            assert np.array_equal(renderer.render(view), picture) == same
+
+
+def test_without_packing_all_is_stored_and_no_pixel_changes():
+    volume = synthetic_ct(40)
+    view = view_of(volume, DIRECTIONS[0], size=(64, 64))
+    renderer = Renderer(volume, TransferFunction(SURFACE))
+    picture, packed = renderer.render(view), renderer.last["runs_bytes"]
+    renderer.settings = Settings(pack_runs=False)
+    np.testing.assert_array_equal(renderer.render(view), picture)
+    dense = renderer.last["runs_bytes"]
+    assert renderer.runs.axis(2).voxel_count == volume.data.size
+    assert dense > packed
 
 
 @pytest.mark.parametrize("quality", [0.3, 1.0, 3.0])

@@ -80,8 +80,7 @@ def _milliseconds(name: str) -> Callable[[Row], str]:
 def _who(row: Row) -> str:
     if row["renderer"] != "persp_sw":
         return row["renderer"]
-    samples = row["samples_per_interval"]
-    text = f"q {row['quality']:.3g}" + (f", {samples} samples" if samples else "")
+    text = f"q {row['quality']:.3g}, {row['samples_per_interval']}" + " pre" * row["preintegrated"]
     if row["residual"] != 0.005:
         text += f", residual {row['residual']:g}"
     if "equal_to" in row:

@@ -55,7 +55,11 @@ comes before them. --quality and --samples change speed and error, never the loo
 @click.option(
     "--intermediate", type=int, metavar="N", help="Pixels of the eye image's longer side; replaces --quality."
 )
-@click.option("--preintegrated", is_flag=True, help="All values on a ray count, not only those at samples.")
+@click.option(
+    "--preintegrated/--point-samples",
+    default=None,
+    help="All values on a ray count, or only those at samples; by the transfer function where not said.",
+)
 @setting_options
 @view_options
 @region_options
@@ -67,7 +71,7 @@ def render(
     judge: bool,
     tolerance: float,
     intermediate: int | None,
-    preintegrated: bool,
+    preintegrated: bool | None,
     quality: float,
     samples: str | None,
     residual: float,
@@ -122,8 +126,6 @@ def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, prog
         "out": str(path),
         "preset": scene.preset.name if scene.preset else None,
         "quality": settings.quality,
-        "samples_per_interval": settings.samples_per_interval,
-        "preintegrated": settings.preintegrated,
         **timing.report(),
         "dense_bytes": volume.data.nbytes,
     }

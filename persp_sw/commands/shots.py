@@ -20,6 +20,9 @@ from ..renderer import Renderer
 from ..warp.canvas import Canvas
 from .output import ProgressCall
 
+_COUNTS = (
+    "threads", "faces", "intermediate_size", "samples_per_interval", "preintegrated", "samples", "runs_bytes",
+)  # fmt: skip
 MIN_FRAMES = 3  # `max_seconds` never stops before
 
 
@@ -63,7 +66,7 @@ class Timing:
             "warp_ms": median(self.warp_ms),
             "encode_ms": self.encode_ms,
             "compile_ms": self.compile_ms,
-            **{key: last[key] for key in ("threads", "faces", "intermediate_size", "samples", "runs_bytes")},
+            **{key: last[key] for key in _COUNTS},
         }
 
 

@@ -108,7 +108,6 @@ def settings_row(settings: Settings) -> Row:
         "renderer": "persp_sw",
         "threads": settings.threads,
         "quality": settings.quality,
-        "samples_per_interval": settings.samples_per_interval,
         "residual": settings.residual,
     }
 
@@ -188,7 +187,7 @@ def compare_at_equal_accuracy(rows: Sequence[Row]) -> list[Row]:
         result.append(
             {
                 **{name: equal[name] for name in ("case", "size", "threads", "mode", "quality", "reached")},
-                "samples_per_interval": equal["samples_per_interval"],
+                **{name: equal[name] for name in ("samples_per_interval", "preintegrated")},
                 "peer": peer["renderer"],
                 "peer_ms": peer["ms"],
                 "peer_psnr": peer["psnr"],

@@ -26,11 +26,12 @@ MODES: dict[str, Changes] = {
 # Each against the default.
 ABLATIONS: dict[str, Changes] = {
     "no skipping": {"skip_empty": False},
+    "no packing": {"pack_runs": False},
     "no termination": {"residual": 0.0},
-    "1 sample an interval": {"samples_per_interval": 1},
     "2 samples an interval": {"samples_per_interval": 2},
     "4 samples an interval": {"samples_per_interval": 4},
     "pre-integrated": {"preintegrated": True},
+    "samples at points": {"preintegrated": False},
     "no levels of detail": {"level_of_detail": False},
     "a face for each axis": {"single_face_tangent": 1.0},
 }

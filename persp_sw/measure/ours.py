@@ -15,6 +15,8 @@ from .cases import Stage
 from .memory import peak_bytes, restart_peak
 from .waste import samples_that_count
 
+_COUNTS = "faces", "intermediate_size", "samples_per_interval", "preintegrated", "samples", "runs_bytes"
+
 
 @dataclass(eq=False)
 class Ours:
@@ -60,10 +62,9 @@ class Ours:
             stage.transfer,
             self.settings,
             stage.regions,
-            last.get("samples_per_interval"),
         )
         return {
-            **{name: last[name] for name in ("faces", "intermediate_size", "samples", "runs_bytes")},
+            **{name: last[name] for name in _COUNTS},
             "needed_samples": round(needed),
             "waste": last["samples"] / needed if needed else None,
             "dense_bytes": stage.volume.data.nbytes,

@@ -2,7 +2,8 @@
 
 A sample counts if its ray meets some wall, it lies in the shown part of the volume, its extinction is above
 0, and what lies before it lets more light through than the residual at which rays stop. The count is made in
-float64, ray by ray on the same pixels and sample planes, with no store, no mask, no packet and no skipping.
+float64, ray by ray on the same pixels, with as many samples in an interval, on slices and between, at the
+finest level, with no store, no mask, no packet and no skipping.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import _jit
-from ..compositor import OPAQUE_DEPTH
 from ..eye_image import EyeImage
 from ..geometry.regions import Regions
 from ..geometry.view import View, Wall
 from ..kernels.count import count_samples
 from ..kernels.scanline import STEEP
+from ..optics.classification import Classification
 from ..optics.transfer import MAX_OPACITY, TransferFunction
+from ..sampling import choose_sampling
 from ..settings import Settings
 from ..volume.grid import Volume
 from ..volume.levels import STANDARD_AXES, standard_rows
@@ -34,7 +36,6 @@ def samples_that_count(
     transfer: TransferFunction,
     settings: Settings,
     regions: Regions | None = None,
-    per_interval: int | None = None,
 ) -> float:
     """Samples that an ideal compositor would take for this eye image.
 
@@ -42,8 +43,6 @@ def samples_that_count(
     ----------
     walls
         Those the eye image was composited for.
-    per_interval
-        Samples in a slice interval of a ray that is not steep; None: as the settings say.
 
     Returns
     -------
@@ -54,7 +53,7 @@ def samples_that_count(
     transfer = transfer.with_unit(min(volume.spacing))
     if min(volume.size) < 2:
         return 0.0
-    least = per_interval or settings.samples_per_interval or _automatic_samples(volume, transfer)
+    least = choose_sampling(settings, Classification.of(transfer, volume), volume).samples_per_interval
     points = np.column_stack([transfer.values, transfer.opacities])
     half_spaces = regions.half_spaces(volume)
     object_from_world = np.linalg.inv(volume.world_from_object)
@@ -113,10 +112,3 @@ def _shown(directions: NDArray[np.float64], views: Sequence[View]) -> NDArray[np
         with np.errstate(invalid="ignore"):
             shown |= ((at >= 0) & (at <= view.size)).all(-1)
     return shown
-
-
-def _automatic_samples(volume: Volume, transfer: TransferFunction) -> int:
-    """What `Settings.samples_per_interval` = None means: 2 where one sample can be opaque."""
-    inside = np.clip(np.append(transfer.values, volume.value_range), *volume.value_range)
-    depth = transfer.extinction(inside).max() * max(volume.spacing)
-    return 2 if depth > OPAQUE_DEPTH else 1

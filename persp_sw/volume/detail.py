@@ -21,6 +21,8 @@ class DetailStore:
         What can be seen, in all levels.
     progress
         Called as progress(steps done, steps, what) while a level is made or an axis encoded.
+    stored
+        As `RunStore`'s.
     """
 
     def __init__(
@@ -28,12 +30,13 @@ class DetailStore:
         volume: Volume,
         visibility: Visibility,
         progress: Callable[[int, int, str], None] | None = None,
+        stored: Visibility | None = None,
     ):
         self.volume = volume
         self.levels = Levels(volume, progress)
         self._progress = progress
-        self._visibility = visibility
-        self._stores = {0: RunStore(volume, visibility, progress)}
+        self._visibility, self._stored = visibility, stored
+        self._stores = {0: RunStore(volume, visibility, progress, stored)}
 
     def __len__(self) -> int:
         """Number of levels."""
@@ -43,14 +46,14 @@ class DetailStore:
         """The runs of level `number`, 0 the finest."""
         if number not in self._stores:
             level = self.levels.level(number)
-            self._stores[number] = RunStore(level, self._visibility, self._progress)
+            self._stores[number] = RunStore(level, self._visibility, self._progress, self._stored)
         return self._stores[number]
 
-    def classify(self, visibility: Visibility) -> None:
+    def classify(self, visibility: Visibility, stored: Visibility | None = None) -> None:
         """Change what can be seen; everything encoded so far is dropped, the levels are kept."""
-        self._visibility = visibility
+        self._visibility, self._stored = visibility, stored
         for store in self._stores.values():
-            store.classify(visibility)
+            store.classify(visibility, stored)
 
     @property
     def encode_seconds(self) -> float:

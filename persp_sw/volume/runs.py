@@ -106,6 +106,8 @@ class RunStore:
         bounds do not depend on it and are kept.
     progress
         Called as progress(steps done, steps, "encoding x") while an axis is encoded.
+    stored
+        Whose voxels are kept; None: of what can be seen. It must include that.
     """
 
     def __init__(
@@ -113,18 +115,19 @@ class RunStore:
         volume: Volume,
         visibility: Visibility,
         progress: Callable[[int, int, str], None] | None = None,
+        stored: Visibility | None = None,
     ):
         self.volume = volume
         self.progress = progress
         self.bounds = BlockBounds(volume)
         self._axes: dict[int, AxisRuns] = {}
         self._box: tuple[NDArray, NDArray] | None = None
-        self._visibility = visibility
+        self._visibility, self._stored = visibility, stored or visibility
         self.encode_seconds = 0.0  # spent so far, compilation not counted
 
-    def classify(self, visibility: Visibility) -> None:
+    def classify(self, visibility: Visibility, stored: Visibility | None = None) -> None:
         """Change what can be seen; everything encoded so far is dropped."""
-        self._visibility = visibility
+        self._visibility, self._stored = visibility, stored or visibility
         self._axes.clear()
         self._box = None
 
@@ -147,7 +150,7 @@ class RunStore:
         if self._box is None:
             box = np.empty(6, np.int64)
             with self._timed():
-                encode.bounding_box(self._mark(*self.bounds.bricks()), box)
+                encode.bounding_box(self._mark(self._visibility, *self.bounds.bricks()), box)
             z0, z1, y0, y1, x0, x1 = box.tolist()
             low, high = np.full(3, np.inf), np.full(3, -np.inf)
             if z0 <= z1:
@@ -193,23 +196,30 @@ class RunStore:
         yield
         self.encode_seconds += max(perf_counter() - _jit.compile_seconds() - start, 0.0)
 
-    def _mark(self, low: NDArray, high: NDArray, *, pairs: bool = False) -> NDArray[np.uint64]:
+    def _mark(
+        self, visibility: Visibility, low: NDArray, high: NDArray, *, pairs: bool = False
+    ) -> NDArray[np.uint64]:
         n_j, n_k, n_m = low.shape
         visible = np.empty((n_j, n_k - 1 if pairs else n_k, -(-n_m // encode.WORD)), np.uint64)
-        encode.mark_visible(low, high, *visible_intervals(self._visibility, self.volume), visible)
+        encode.mark_visible(low, high, *visible_intervals(visibility, self.volume), visible)
         return visible
 
     def _encode(self, axis: int, pairs: bool) -> AxisRuns:
         n_j, n_k, n_i = standard_rows(self.volume, axis).shape
         self._report(0, axis)
         bounds = self.bounds.of(axis)
-        visible = self._mark(*bounds)
-        between = self._mark(*bounds, pairs=True) if pairs else np.empty((0, 0, visible.shape[2]), np.uint64)
+        visible = self._mark(self._visibility, *bounds)
+        between = np.empty((0, 0, visible.shape[2]), np.uint64)
+        if pairs:
+            between = self._mark(self._visibility, *bounds, pairs=True)
+        stored = between if pairs else visible
+        if self._stored is not self._visibility:
+            stored = self._mark(self._stored, *bounds, pairs=pairs)
         self._report(1, axis)
         needed = np.empty((n_j, n_k, visible.shape[2]), np.uint64)
         counts = np.empty(needed.shape, np.int64)
         runs = np.empty(n_j, np.int64)
-        encode.mark_needed(between if pairs else visible, pairs, n_i, needed, counts, runs)
+        encode.mark_needed(stored, pairs, n_i, needed, counts, runs)
         ends = PADDING + np.cumsum(counts.reshape(-1))
         offsets = (ends - counts.reshape(-1)).reshape(counts.shape)
         self._report(2, axis)

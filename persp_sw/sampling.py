@@ -1,0 +1,33 @@
+"""How rays are sampled: how often in a slice interval, and what a sample stands for."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .optics.classification import Classification
+from .settings import Settings
+from .volume.grid import Volume
+
+# Optical depth of the longest slice interval beyond which one sample hides all that follows (5 % are left).
+OPAQUE_DEPTH = 3.0
+
+
+class Sampling(NamedTuple):
+    """Samples in a slice interval of a ray that is not steep; whether each takes its piece's mean."""
+
+    samples_per_interval: int
+    preintegrated: bool
+
+
+def choose_sampling(settings: Settings, classification: Classification, volume: Volume) -> Sampling:
+    """What `settings` say, or, where they leave it open, what serves this transfer function best.
+
+    Where one sample can be opaque, what it misses shows: one pre-integrated sample is within 0.5 dB of two
+    others on the real volumes tried, at 75 to 90 % of their time (`docs/performance.md`). Elsewhere one plain
+    sample does.
+    """
+    preintegrated = settings.preintegrated
+    if preintegrated is None:
+        opaque = classification.largest_extinction * max(volume.spacing) > OPAQUE_DEPTH
+        preintegrated = opaque and settings.samples_per_interval is None
+    return Sampling(settings.samples_per_interval or 1, preintegrated)
