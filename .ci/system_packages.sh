@@ -2,7 +2,7 @@
 # OpenGL without a screen (Mesa's EGL) and a virtual screen (Xvfb), for the tests that draw with OpenGL.
 # Installs what is missing where we may; otherwise says in one line what to install. Never fatal unless CI=true,
 # where tests must not be skipped.
-packages="libegl1 libgl1 libgl1-mesa-dri xvfb"
+packages="libegl1 libgl1 libgl1-mesa-dri xvfb xdotool"
 
 missing=""
 libraries=$(ldconfig -p 2>/dev/null || /sbin/ldconfig -p 2>/dev/null)
@@ -13,6 +13,7 @@ for library in libEGL.so.1:libegl1 libGL.so.1:libgl1 libEGL_mesa.so.0:libegl-mes
     esac
 done
 command -v Xvfb >/dev/null 2>&1 || missing="$missing xvfb"
+command -v xdotool >/dev/null 2>&1 || missing="$missing xdotool"
 [ -z "$missing" ] && exit 0
 
 if command -v apt-get >/dev/null 2>&1; then
