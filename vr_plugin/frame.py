@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 import persp_sw as psw
+from persp_sw.errors import ViewError
 
 from .eyes import EyePair
 from .pose import Pose
 from .rig import RigWall
+
+_log = logging.getLogger("persp_sw")
+_NONE: Mapping[str, str] = MappingProxyType({})
 
 # Which eyes a stereo mode needs.
 EYES_OF = {"mono": ("middle",), "left": ("left",), "right": ("right",)}
@@ -43,11 +49,13 @@ class Frame:
     Attributes
     ----------
     images
-        Eye images by the eye's name; none of an eye that sees nothing of the volume.
+        Eye images by the eye's name, those of eyes that see nothing of the volume, without faces, included.
     compositings
-        How many eye images were composited.
+        How many eye images show anything: those that cost something.
     statistics
         `Renderer.last` of each eye image.
+    edge_on
+        Names of walls in whose plane an eye lies, which can show it nothing.
     """
 
     head: Pose
@@ -56,6 +64,7 @@ class Frame:
     images: Mapping[str, psw.EyeImage]
     compositings: int
     statistics: Mapping[str, Mapping[str, object]]
+    edge_on: Sequence[str] = ()
 
 
 class FrameMaker:
@@ -76,6 +85,7 @@ class FrameMaker:
         self.walls = tuple(walls)
         self.room_from_world = room_from_world
         self._previous: dict[str, psw.EyeImage] = {}
+        self._said: set[str] = set()
 
     @property
     def room_from_world(self) -> np.ndarray:
@@ -86,9 +96,10 @@ class FrameMaker:
     def room_from_world(self, matrix: np.ndarray) -> None:
         self._room_from_world = np.array(matrix, np.float64)
         self._world_from_room = np.linalg.inv(self._room_from_world)
-        self._scale = float(np.cbrt(abs(np.linalg.det(self._room_from_world[:3, :3]))))  # metres a unit
+        self._metres = float(np.cbrt(abs(np.linalg.det(self._room_from_world[:3, :3]))))  # a world unit
+        self._world_walls = {wall.name: self._in_world(wall.wall) for wall in self.walls}
 
-    def make(self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = {}) -> Frame:
+    def make(self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE) -> Frame:
         """Composite every eye once, for all the walls that show it.
 
         Parameters
@@ -98,27 +109,33 @@ class FrameMaker:
         modes
             Stereo modes by wall name, where not the rig's own.
         """
-        pictures, images, statistics = [], {}, {}
+        pictures, images, statistics, edge_on = [], {}, {}, []
         shown = {wall.name: EYES_OF.get(modes.get(wall.name, wall.stereo), BOTH) for wall in self.walls}
         for name in dict.fromkeys(name for names in shown.values() for name in names):
-            eye = psw.Eye(self._world(getattr(eyes, name)), near / self._scale)
-            walls = [wall for wall in self.walls if name in shown[wall.name]]
-            world_walls = [self.wall_in_world(wall) for wall in walls]
-            image = self.renderer.composite(eye, world_walls, self._previous.get(name))
-            statistics[name] = dict(self.renderer.last)
+            eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)
+            views = []
+            for wall in self.walls:
+                if name in shown[wall.name]:
+                    try:
+                        views.append((wall, psw.View(eye, self._world_walls[wall.name])))
+                    except ViewError as error:
+                        edge_on.append(wall.name)
+                        self._say(wall.name, error)
+            image = self.renderer.composite(eye, [view.wall for _, view in views], self._previous.get(name))
             images[name] = self._previous[name] = image
-            pictures += [
-                Picture(wall, name, psw.View(eye, world), image)
-                for wall, world in zip(walls, world_walls, strict=True)
-            ]
-        drawn = {name: image for name, image in images.items() if image.faces}
-        return Frame(head, eyes, tuple(pictures), drawn, len(drawn), statistics)
+            statistics[name] = dict(self.renderer.last)
+            pictures += [Picture(wall, name, view, image) for wall, view in views]
+        count = sum(bool(image.faces) for image in images.values())
+        return Frame(head, eyes, tuple(pictures), images, count, statistics, tuple(edge_on))
 
-    def wall_in_world(self, wall: RigWall) -> psw.Wall:
-        """A wall where it stands in the volume's world."""
-        w = wall.wall
-        corners = (self._world(c) for c in (w.lower_left, w.lower_right, w.upper_left))
-        return psw.Wall(*corners, pixels=w.pixels, name=w.name)
+    def _in_world(self, wall: psw.Wall) -> psw.Wall:
+        corners = (self._point(c) for c in (wall.lower_left, wall.lower_right, wall.upper_left))
+        return psw.Wall(*corners, pixels=wall.pixels, name=wall.name)
 
-    def _world(self, point: np.ndarray) -> np.ndarray:
+    def _point(self, point: np.ndarray) -> np.ndarray:
         return self._world_from_room[:3, :3] @ point + self._world_from_room[:3, 3]
+
+    def _say(self, wall: str, error: ViewError) -> None:
+        if wall not in self._said:
+            self._said.add(wall)
+            _log.warning("wall %r shows nothing while an eye is in its plane: %s", wall, error)
