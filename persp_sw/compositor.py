@@ -166,7 +166,8 @@ def _table(classification: Classification, preintegrated: bool) -> Table | Integ
     mapping = np.float32(classification.origin), np.float32(classification.scale)
     if preintegrated:
         integrals = classification.integrals
-        return IntegralTable(integrals.sums, integrals.beyond, *mapping, np.float32(integrals.unit))
+        numbers = (np.float32(n) for n in (integrals.end, integrals.unit, integrals.steps))
+        return IntegralTable(integrals.sums, integrals.beyond, *mapping, *numbers)
     return Table(classification.table, *mapping)
 
 

@@ -22,9 +22,8 @@ class Sampling(NamedTuple):
 def choose_sampling(settings: Settings, classification: Classification, volume: Volume) -> Sampling:
     """What `settings` say, or, where they leave it open, what serves this transfer function best.
 
-    Where one sample can be opaque, what it misses shows: one pre-integrated sample is within 0.5 dB of two
-    others on the real volumes tried, at 75 to 90 % of their time (`docs/performance.md`). Elsewhere one plain
-    sample does.
+    Where one sample can be opaque, what it misses shows: one pre-integrated sample then is as good as two to
+    four others, at about the time of two (`docs/performance.md`). Elsewhere one plain sample does.
     """
     preintegrated = settings.preintegrated
     if preintegrated is None:

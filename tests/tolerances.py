@@ -40,6 +40,10 @@ CLOSED_FORM = 2e-6
 # (0.5 opacity / 255 values) / 8 entries a value = 2.5e-4 of extinction for 8-bit data, in few samples.
 COMPOSITE_TWIN = 3e-4
 
+# The colours of a pre-integrated piece are taken from up to two of the 1024 steps of extinction too many,
+# which moves their mean by half of that, through colours that differ by at most 1.
+PREINTEGRATED_COLOUR = 1e-3
+
 # Two pre-integrated samples, one of whose ends may fall on the next row: of two rows or more, the mean
 # changes by less than half of the test's steepest step, 0.51 of extinction / 5 values / 8 rows = 0.013,
 # times 1/2.

@@ -155,7 +155,9 @@ def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, o
 
 
 def preintegrated_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale):
-    """As `composite_pixel`, pre-integrated: each piece is the mean of the table's rows between its ends'."""
+    """As `composite_pixel`, pre-integrated: a piece's opacity is that of the mean of the table's rows between
+    its ends', its colour the mean, weighted by extinction, over the first part of them (see `seen_colour`).
+    """
     e, sign, t = np.array(face[:3]), face[3], np.array(face[4:6])
     near, far, length = ray_range(face, half_spaces, metric)
     result = np.zeros(4)
@@ -182,15 +184,28 @@ def preintegrated_pixel(rows, face, box, half_spaces, metric, per_interval, tabl
             (scalar(*(at + d)) - scalar(*(at - d))) / 2 for d in np.eye(3)
         ]  # exact: it is multilinear
         ends = scalar(*at) + np.dot(gradient, [*t, sign]) * (np.array([begin, end]) - ahead)
+        rising = ends[1] >= ends[0]
         ends = np.clip(np.sort(ends), cell.min(), cell.max())
         first, last = np.floor((ends - origin) * scale + 1.5).astype(int)
         covered = table[np.clip(np.arange(first, last + 1), 1, len(table) - 1)].astype(float)
-        tau = covered[:, 3].mean()
-        if tau:
-            colour = (covered[:, :3] * covered[:, 3:]).mean(0) / tau
-            share = (1 - result[3]) * -np.expm1(-tau * length * (end - begin))
-            result += share * np.array([*colour, 1])
+        depth = covered[:, 3].mean() * length * (end - begin)
+        if depth:
+            colour = seen_colour(covered if rising else covered[::-1], depth)
+            result += (1 - result[3]) * -np.expm1(-depth) * np.array([*colour, 1])
     return result
+
+
+def seen_colour(rows, depth):
+    """The mean colour of rows (r, g, b, τ) front to back over as much extinction as has its mean place where
+    exp(−x) has it, x = 0 … depth.
+    """
+    mean_place = 1 - depth * np.exp(-depth) / -np.expm1(-depth)
+    if depth < 1e-4:
+        mean_place = depth / 2
+    passed = np.concatenate([[0], np.cumsum(rows[:, 3])])
+    amount = passed[-1] * 2 * mean_place / depth
+    taken = np.clip(amount - passed[:-1], 0, rows[:, 3])
+    return taken @ rows[:, :3] / taken.sum()
 
 
 def warp_pixel(direction, faces):

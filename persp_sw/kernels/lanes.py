@@ -7,9 +7,14 @@ vectors there are.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from llvmlite import ir
 
 from .state import TILE
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _FLOAT, _INT32, _INT64 = ir.FloatType(), ir.IntType(32), ir.IntType(64)
 _FLOATS, _INTS = ir.VectorType(_FLOAT, TILE), ir.VectorType(_INT32, TILE)
@@ -55,6 +60,9 @@ class Floats:
 
     def __ge__(self, other):
         return self.builder.fcmp_ordered(">=", self.value, self._other(other))
+
+    def __gt__(self, other):
+        return self.builder.fcmp_ordered(">", self.value, self._other(other))
 
     def is_number(self):
         """Mask of the lanes that are not NaN."""
@@ -150,6 +158,27 @@ def look_up_differences(
     return [Floats(builder, builder.sitofp(column, _FLOATS)) for column in columns]
 
 
+def look_up_column(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, column: int) -> ir.Value:
+    """`<16 x i32>`: one column of `rows` of a table with four int32 a row."""
+    result = ir.Constant(_INTS, ir.Undefined)
+    for lane in range(TILE):
+        row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
+        at = builder.add(builder.shl(row, ir.Constant(_INT64, 2)), ir.Constant(_INT64, column))
+        number = builder.load(builder.gep(table, [at]))
+        result = builder.insert_element(result, number, ir.Constant(_INT32, lane))
+    return result
+
+
+def to_floats(builder: ir.IRBuilder, integers: ir.Value) -> Floats:
+    """`<16 x i32>` as floats."""
+    return Floats(builder, builder.sitofp(integers, _FLOATS))
+
+
+def select(builder: ir.IRBuilder, mask: ir.Value, one: ir.Value, other: ir.Value) -> ir.Value:
+    """Of two `<16 x i32>`, `one` where the mask is set."""
+    return builder.select(mask, one, other)
+
+
 def _row(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, lane: int) -> ir.Value:
     """The four numbers of row rows[lane]."""
     row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
@@ -188,3 +217,18 @@ def none(builder: ir.IRBuilder, mask: ir.Value) -> ir.Value:
     """Whether the mask is empty."""
     bits = builder.bitcast(mask, ir.IntType(TILE))
     return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(TILE), 0))
+
+
+def where_any(builder: ir.IRBuilder, mask: ir.Value, build: Callable[[], ir.Value]) -> ir.Value:
+    """The truth value that `build` makes, made only if the mask is not empty; else false."""
+    start, inside, after = builder.block, *(builder.append_basic_block() for _ in range(2))
+    builder.cbranch(none(builder, mask), after, inside)
+    builder.position_at_end(inside)
+    made = build()
+    last = builder.block
+    builder.branch(after)
+    builder.position_at_end(after)
+    result = builder.phi(ir.IntType(1))
+    result.add_incoming(made, last)
+    result.add_incoming(ir.Constant(ir.IntType(1), 0), start)
+    return result

@@ -37,7 +37,9 @@ class IntegralTable(NamedTuple):
     beyond: np.ndarray
     origin: np.float32
     scale: np.float32
+    end: np.float32
     unit: np.float32
+    steps: np.float32
 
 
 def sample(

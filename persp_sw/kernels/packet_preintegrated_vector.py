@@ -4,11 +4,24 @@ import numpy as np
 
 from .._jit import inlined_kernel, intrinsic, types
 from . import lanes as simd
+from .packet_preintegrated_portable import EDGE, STEPS
 from .packet_vector import NARROW, Tile, pick, pointer, section_at, slot_of, word
-from .state import FAR_ROW, RAY_FAR, RAY_NEAR, SECOND, SECOND_END, TILE, VALUE, VALUE_END
+from .state import (
+    FAR_ROW,
+    MINUS_LN2,
+    RAY_FAR,
+    RAY_NEAR,
+    SECOND,
+    SECOND_END,
+    THIN,
+    TILE,
+    VALUE,
+    VALUE_END,
+)
 
 _NONE, _ONE = np.uint64(0), np.uint64(1)
 _END = VALUE_END - VALUE
+_EDGE = float(EDGE)
 
 
 def _sampler(registers):
@@ -76,10 +89,11 @@ def _sampler(registers):
                 )
 
             shown = builder.and_(shown, value.is_number())
-            first = simd.where(shown, row(one.at_most(two)), np.nan)
+            rising = two >= one
+            lower, upper = row(one.at_most(two)), row(one.at_least(two)) + 1.0
             sample_at = Tile(builder, tile.state, builder.add(tile.at, arguments[19]))
-            sample_at.write(first, 0)
-            sample_at.write(row(one.at_least(two)) + 1.0, _END)
+            sample_at.write(simd.where(shown, simd.where(rising, lower, upper), np.nan), 0)
+            sample_at.write(simd.where(rising, upper, lower), _END)
             return context.get_dummy_value()
 
         arguments = (
@@ -112,51 +126,101 @@ def sample(
         )  # fmt: skip
 
 
+class _Piece:
+    """One pre-integrated sample of a tile, from the rows it left to its extinction."""
+
+    def __init__(self, builder, tile, entries, beyond, end, sections):
+        near, far = (tile.read(section) for section in sections)
+        there = near.is_number()
+        near, far = simd.where(there, near, 1.0), simd.where(there, far, 1.0)
+        rising = far >= near
+        lowest, highest = near.at_most(far), near.at_least(far)
+        below = (highest.at_most(1.0) - lowest).at_least(0.0)
+        above = (highest - lowest.at_least(end)).at_least(0.0)
+        # What lies beyond the table, where the piece begins and where it ends.
+        self.before = [simd.where(rising, low, high) for low, high in zip(*beyond, strict=True)]
+        self.behind = [simd.where(rising, high, low) for low, high in zip(*beyond, strict=True)]
+        self.ahead = simd.where(rising, below, above) * self.before[3]
+        self.rest = simd.where(rising, above, below) * self.behind[3]
+        self.rows = [row.at_least(1.0).at_most(end).to_integers() for row in (near, far)]
+        first, last = (simd.look_up_column(builder, entries, row, 3) for row in self.rows)
+        self.sign = simd.where(rising, simd.constant(builder, [1.0] * TILE), -1.0)
+        self.start = simd.to_floats(builder, first)
+        self.inside = self.sign * simd.to_floats(builder, builder.sub(last, first))
+        self.total = self.ahead + self.inside + self.rest
+        self.count = (highest - lowest).at_least(1.0)
+        self.rising, self.builder, self.tile, self.entries, self.end = rising, builder, tile, entries, end
+
+    def colour_and_opacity(self, slot, unit, steps):
+        """Three channels, not premultiplied, and α."""
+        builder, sign, inside = self.builder, self.sign, self.inside
+        y = self.tile.depth(self.total * unit / self.count, *slot)
+        alpha = self.tile.opacity(y)
+        wanted = _seen_part(y * float(MINUS_LN2), alpha) * self.total
+        ahead = self.ahead.at_most(wanted)
+        within = wanted - ahead
+        at = (self.start + sign * within) * steps
+        step = simd.where(self.rising, (at + _EDGE).floor() + 1.0, -1.0 - (_EDGE - at).floor())
+        step = step.at_least(0.0).at_most(float(STEPS)) + (self.end + 1.0)
+        whole = within >= inside - 1.0 / steps
+        row = simd.select(builder, whole, self.rows[1], step.to_integers())
+        *colour, amount = (
+            sign * d for d in simd.look_up_differences(builder, self.entries, self.rows[0], row)
+        )
+        rest = simd.where(whole, (within - inside).at_least(0.0), 0.0)
+        reciprocal = 1.0 / (ahead + amount + rest).at_least(1.0)
+        return [
+            (ahead * self.before[n] + channel + rest * self.behind[n]) * reciprocal
+            for n, channel in enumerate(colour)
+        ], alpha
+
+
+def _seen_part(depth, alpha):
+    """See `packet_preintegrated_portable`."""
+    thick = 2.0 * (alpha - depth * (1.0 - alpha)) / (depth * alpha)
+    return simd.where(depth < float(THIN), 1.0 - depth * (1.0 / 6.0), thick)
+
+
 @intrinsic
-def _blend(_context, sums, beyond, end, unit, one, other, lanes, at):
+def _blend(_context, sums, beyond, end, unit, steps, one, other, lanes, at):
     def build(context, builder, signature, arguments):
         entries = pointer(context, builder, signature.args[0], arguments[0])
-        tile = Tile(builder, pointer(context, builder, signature.args[6], arguments[6]), arguments[7])
-        rest = pointer(context, builder, signature.args[1], arguments[1])
-        end, unit = (simd.everywhere(builder, scalar) for scalar in arguments[2:4])
-        slots = [
-            [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
-            for slot in arguments[4:6]
-        ]
-        lower, upper = (
+        tile = Tile(builder, pointer(context, builder, signature.args[7], arguments[7]), arguments[8])
+        outside = pointer(context, builder, signature.args[1], arguments[1])
+        numbers = [simd.everywhere(builder, scalar) for scalar in arguments[2:5]]
+        beyond = [
             [
-                simd.everywhere(builder, builder.load(builder.gep(rest, [word(4 * side + n)])))
+                simd.everywhere(builder, builder.load(builder.gep(outside, [word(4 * side + n)])))
                 for n in range(4)
             ]
             for side in range(2)
-        )
-        colours = []
-        for section, end_section in ((VALUE, VALUE_END), (SECOND, SECOND_END)):
-            first, after = tile.read(section), tile.read(end_section)
-            there = first.is_number()
-            first, after = simd.where(there, first, 1.0), simd.where(there, after, 1.0)
-            rows = [row.at_least(1.0).at_most(end).to_integers() for row in (first, after)]
-            below = (after.at_most(1.0) - first).at_least(0.0)
-            above = (after - first.at_least(end)).at_least(0.0)
-            *colour, sum_ = (
-                inside + below * lower[n] + above * upper[n]
-                for n, inside in enumerate(simd.look_up_differences(builder, entries, *rows))
-            )
-            count, extinction = (after - first).at_least(1.0), sum_.at_least(1.0)
-            reciprocal = 1.0 / (extinction * count)  # one division for both quotients
-            weight = count * reciprocal
-            mean = sum_ * (extinction * reciprocal)
-            colours.append([*(channel * weight for channel in colour), mean * unit])
-        return tile.blend(colours, slots)
+        ]
+        end, unit, steps = numbers
+        pieces = [
+            _Piece(builder, tile, entries, beyond, end, sections)
+            for sections in ((VALUE, VALUE_END), (SECOND, SECOND_END))
+        ]
+
+        def lay():
+            slots = [
+                [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
+                for slot in arguments[5:7]
+            ]
+            both = (p.colour_and_opacity(slot, unit, steps) for p, slot in zip(pieces, slots, strict=True))
+            return tile.blend(*zip(*both, strict=True))
+
+        # Packets in cells that may be seen, but see nothing themselves, end here: 0.89 of the time.
+        return simd.where_any(builder, (pieces[0].total + pieces[1].total) > 0.0, lay)
 
     slot = types.UniTuple(types.float32, 4)
-    return types.boolean(sums, beyond, types.float32, types.float32, slot, slot, lanes, types.int64), build
+    arguments = (sums, beyond, *[types.float32] * 3, slot, slot, lanes, types.int64)
+    return types.boolean(*arguments), build
 
 
 @inlined_kernel
 def blend(n, table, slots, scratch, cells, lanes, at):
     """See `packet_preintegrated_portable.blend`."""
-    end = np.float32(table.sums.shape[0] - 1)
     return _blend(
-        table.sums, table.beyond, end, table.unit, slot_of(slots, _NONE), slot_of(slots, _ONE), lanes, at
-    )
+        table.sums, table.beyond, table.end, table.unit, table.steps, slot_of(slots, _NONE),
+        slot_of(slots, _ONE), lanes, at,
+    )  # fmt: skip

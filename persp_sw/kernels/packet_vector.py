@@ -147,12 +147,17 @@ class Tile:
         """16 floats to the tile's `section`."""
         simd.store(self.builder, values, self.state, section_at(self.builder, self.at, section))
 
-    def opacity(self, extinction, near, far, share, slope):
-        """Of what is left of [near, far] in the range of each ray; see `packet_portable.blend`."""
+    def depth(self, extinction, near, far, share, slope):
+        """−log2 e times the optical depth of what is left of [near, far] in the range of each ray, no less
+        than −126; see `packet_portable.blend`.
+        """
         begin, end = self.read(RAY_NEAR).at_least(near), self.read(RAY_FAR).at_most(far)
         length = (end - begin).at_least(0.0)
         share = share + slope * (begin + end)
-        y = (extinction * (self.read(LENGTH) * length) * share).at_least(-126.0)
+        return (extinction * (self.read(LENGTH) * length) * share).at_least(-126.0)
+
+    def opacity(self, y):
+        """1 − 2^y."""
         shifted = y + float(ROUNDER)
         f = y - (shifted - float(ROUNDER))
         power = simd.power_of_two(self.builder, shifted)
@@ -164,12 +169,11 @@ class Tile:
         q = f * (low + square * (middle + square * high))
         return (1.0 - power) - power * q
 
-    def blend(self, colours, slots):
-        """Lay samples of these colours and extinctions under what is there; whether all pixels are done.
+    def blend(self, colours, alphas):
+        """Lay two samples of these colours and opacities under what is there; whether all pixels are done.
 
         Both side by side, for each alone is one chain of operations that wait for one another.
         """
-        alphas = [self.opacity(colour[3], *slots[n]) for n, colour in enumerate(colours)]
         accumulated = self.read(ALPHA)
         share = (1.0 - accumulated) * alphas[0]
         accumulated = accumulated + share
@@ -200,7 +204,8 @@ def _blend(_context, table, origin, scale, last, one, other, lanes, at):
         tile = Tile(builder, state, at)
         rows = [entry_of(tile.read(section)) for section in (VALUE, SECOND)]
         colours = [simd.look_up(builder, entries, row) for row in rows]
-        return tile.blend(colours, slots)
+        alphas = [tile.opacity(tile.depth(colour[3], *slots[n])) for n, colour in enumerate(colours)]
+        return tile.blend(colours, alphas)
 
     slot = types.UniTuple(types.float32, 4)
     arguments = (table, *[types.float32] * 3, slot, slot, lanes, types.int64)

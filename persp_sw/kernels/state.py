@@ -6,8 +6,8 @@ TILE = 16  # pixels in a tile: one 512-bit vector of floats
 
 # Accumulated colour and opacity; the ray's range, counted from `base`; the ray's world length in one slice
 # interval; the opacity at which it stops; the scalars of two samples being composited, NaN where there is
-# none. Of a pre-integrated sample, VALUE and SECOND hold the first table row it covers and their ENDs the one
-# after the last; beyond the table, too.
+# none. Of a pre-integrated sample, VALUE and SECOND hold the border of table rows where its piece of the
+# ray begins, and their ENDs that where it ends; beyond the table, too.
 (RED, GREEN, BLUE, ALPHA, RAY_NEAR, RAY_FAR, LENGTH, ENOUGH, VALUE, SECOND, VALUE_END, SECOND_END) = (
     np.uint64(TILE * n) for n in range(12)
 )  # fmt: skip
@@ -16,6 +16,8 @@ SECTIONS = 12
 # α = 1 − 2^y is taken as 1 − 2^n·(1 + q) with q = 2^f − 1 = f·(c1 + f·(c2 + …)), |f| ≤ ½, the Taylor series
 # of exp(f·ln 2), remainder below 6e-9: no cancellation, so the faintest media keep their relative accuracy.
 MINUS_LOG2E = np.float32(-1.4426950408889634)
+MINUS_LN2 = np.float32(-0.6931471805599453)
+THIN = np.float32(0.05)  # optical depth below which a piece dims itself as its series' first term says
 ROUNDER = np.float32(12582912.0)  # 1.5·2^23: adding it leaves the nearest integer in the low bits
 # Rows beyond a table that pre-integration counts to: the float32 product of its sum and count stays finite.
 FAR_ROW = np.float32(1e9)
