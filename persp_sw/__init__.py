@@ -22,17 +22,21 @@ if TYPE_CHECKING:
     from .volume.files import load
     from .volume.grid import Volume
     from .warp.canvas import Canvas
+    from .warp.context import OffscreenContext
+    from .warp.texture import TextureWarp
 
 __all__ = [
     "Canvas",
     "Cut",
     "Eye",
     "EyeImage",
+    "OffscreenContext",
     "PerspSWError",
     "Regions",
     "Renderer",
     "Scene",
     "Settings",
+    "TextureWarp",
     "TransferFunction",
     "View",
     "Volume",
@@ -49,11 +53,13 @@ _HOME = {
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
+    "OffscreenContext": ".warp.context",
     "PerspSWError": ".errors",
     "Regions": ".geometry.regions",
     "Renderer": ".renderer",
     "Scene": ".scene",
     "Settings": ".settings",
+    "TextureWarp": ".warp.texture",
     "TransferFunction": ".optics.transfer",
     "View": ".geometry.view",
     "Volume": ".volume.grid",

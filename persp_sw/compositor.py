@@ -61,7 +61,7 @@ def composite_eye(
         )
     pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
-    image = EyeImage(eye, pose, tuple(faces), pixels, 0)
+    image = EyeImage(eye, pose, tuple(faces), pixels, 0, np.array([low, high]), regions.planes(volume))
     images = [image.face_pixels(number) for number in range(len(faces))]
     samples = sum(
         _composite(detail, classification, part, settings, eye, eye_object, face, threads, out)

@@ -31,3 +31,7 @@ class SceneError(PerspSWError):
 
 class MissingPackageError(PerspSWError):
     """An optional package is needed; the message says which extra brings it."""
+
+
+class GraphicsError(PerspSWError):
+    """OpenGL that is absent, too old or not what was asked of it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from zipfile import BadZipFile
 
 import numpy as np
@@ -32,6 +32,11 @@ class EyeImage:
         (total, 4) float32 linear premultiplied RGBA: the faces' pixels one after the other, row by row.
     samples
         Voxel samples taken to make it.
+    box
+        (2, 3): object-space corners of a box that holds all that can be seen in it; infinite where unknown.
+    half_spaces
+        (n, 4) rows, object space: all that can be seen lies where a·p + a_0 ≥ 0, too. Box and half-spaces
+        tell where on a ray its colour comes from, which a scene with a depth buffer asks.
     """
 
     eye: Eye
@@ -39,6 +44,8 @@ class EyeImage:
     faces: tuple[Face, ...]
     pixels: NDArray[np.float32]
     samples: int
+    box: NDArray[np.float64] = field(default_factory=lambda: np.array([[-np.inf] * 3, [np.inf] * 3]))
+    half_spaces: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
 
     def offset(self, number: int) -> int:
         """Where face `number` begins in `pixels`."""
@@ -76,6 +83,8 @@ class EyeImage:
             faces=np.array(table, np.float64).reshape(-1, 9),
             pixels=self.pixels,
             samples=np.int64(self.samples),
+            box=self.box,
+            half_spaces=self.half_spaces,
         )
         return buffer.getvalue()
 
@@ -84,11 +93,14 @@ class EyeImage:
         """Inverse of `to_bytes`; ViewError if the bytes are something else."""
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
-                names = ("eye", "world_from_object", "faces", "pixels", "samples")
+                names = ("eye", "world_from_object", "faces", "pixels", "samples", "box", "half_spaces")
                 content = {name: file[name] for name in names}
             shapes = {name: array.shape for name, array in content.items()}
             pixels = content["pixels"]
-            fits = shapes["eye"] == (5,) and shapes["world_from_object"] == (4, 4) and shapes["samples"] == ()
+            wanted = {"eye": (5,), "world_from_object": (4, 4), "samples": (), "box": (2, 3)}
+            planes = content["half_spaces"]
+            fits = all(shapes[name] == shape for name, shape in wanted.items())
+            fits = fits and planes.ndim == 2 and planes.shape[1] == 4
             if not (fits and pixels.ndim == 2 and pixels.shape[1] == 4 and pixels.dtype == np.float32):
                 raise ValueError(f"its arrays have the shapes {shapes}")
             faces = tuple(_face(*row) for row in content["faces"].tolist())
@@ -97,7 +109,9 @@ class EyeImage:
             eye = Eye(position, near, w)
             if any((face.parallel is not None) != eye.is_at_infinity for face in faces):
                 raise ValueError("its faces are another eye's")
-            image = cls(eye, content["world_from_object"], faces, pixels, samples)
+            if np.isnan(content["box"]).any() or not np.isfinite(planes).all():
+                raise ValueError("its box or half-spaces are no numbers")
+            image = cls(eye, content["world_from_object"], faces, pixels, samples, content["box"], planes)
         except (OSError, EOFError, ValueError, TypeError, KeyError, OverflowError, BadZipFile) as error:
             raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
         if image.offset(len(faces)) != len(pixels):

@@ -7,7 +7,7 @@ import pytest
 from tolerances import MATRIX
 from views import DIRECTIONS, random_pose, view_of
 
-from persp_sw import EyeImage, Renderer, TransferFunction, Volume
+from persp_sw import EyeImage, Regions, Renderer, TransferFunction, Volume
 from persp_sw.errors import ViewError
 
 TF = TransferFunction([(0, (1, 0.5, 0.2), 0), (255, (1, 1, 1), 0.5)], 1.0)
@@ -17,7 +17,8 @@ TF = TransferFunction([(0, (1, 0.5, 0.2), 0), (255, (1, 1, 1), 0.5)], 1.0)
 def image(rng):
     volume = Volume(rng.integers(0, 255, (12, 10, 11)).astype(np.uint8), world_from_object=random_pose(rng))
     view = view_of(volume, DIRECTIONS[1], 1.0, fovy=90)
-    return Renderer(volume, TF).composite(view.eye, [view.wall])
+    clipped = Regions(clip=[(*view.eye.position, 1e4)])
+    return Renderer(volume, TF, regions=clipped).composite(view.eye, [view.wall])
 
 
 def test_bytes_round_trip_bit_for_bit(image):
@@ -29,6 +30,8 @@ def test_bytes_round_trip_bit_for_bit(image):
     np.testing.assert_array_equal(other.world_from_object, image.world_from_object)
     assert other.pixels.dtype == np.float32
     np.testing.assert_array_equal(other.pixels, image.pixels)
+    np.testing.assert_array_equal(other.box, image.box)
+    np.testing.assert_array_equal(other.half_spaces, image.half_spaces)
 
 
 def test_an_eye_image_without_faces_travels_too(image):
@@ -78,6 +81,8 @@ GOOD = {
     "faces": np.array([[0, 1, 0.0, 0.0, 0.1, 2, 2, NOWHERE, NOWHERE]]),
     "pixels": np.zeros((4, 4), np.float32),
     "samples": np.int64(0),
+    "box": np.array([[0, 0, 0], [1, 1, 1.0]]),
+    "half_spaces": np.zeros((0, 4)),
 }
 
 
@@ -97,6 +102,10 @@ GOOD = {
         {"world_from_object": np.eye(3)},
         {"samples": np.zeros(2)},
         {"eye": np.full(5, np.nan)},
+        {"box": np.zeros((2, 2))},
+        {"box": np.full((2, 3), np.nan)},
+        {"half_spaces": np.zeros((2, 3))},
+        {"half_spaces": np.full((1, 4), np.inf)},
     ],
 )
 def test_impossible_contents_are_refused(change):

@@ -220,6 +220,38 @@ class View:
         inverse = np.linalg.inv(self.direction_from_pixel)
         return np.column_stack([inverse, -inverse @ self.eye.position])
 
+    def clip_from_world(self, near: float, far: float) -> Matrix:
+        """(4, 4): world xyz1 to OpenGL's clip space: the wall's corners to x, y = ±w, with y up.
+
+        Parameters
+        ----------
+        near, far
+            World distances that depths z = −w and z = w stand for, near < far: from the eye along the wall's
+            normal, near > 0; for an eye at infinity from the wall along the rays, of either sign.
+        """
+        width, height = self.size
+        column, row, w = self.viewport_from_world
+        near, far = number(near, "the near distance", ViewError), number(far, "the far distance", ViewError)
+        if not near < far or (near <= 0 and not self.eye.is_at_infinity):
+            raise ViewError(f"depths need 0 < near < far; given near {near} and far {far}")
+        last = np.array([0, 0, 0, 1.0])
+        if self.eye.is_at_infinity:
+            away = -self.eye.position
+            distance = np.append(away, -away @ self.wall.lower_left)
+            depth = (2 * distance - (near + far) * last) / (far - near)
+        else:
+            # w is 1 on the wall and grows linearly with the distance.
+            near, far = near / self.wall_distance, far / self.wall_distance
+            depth = ((far + near) * w - 2 * far * near * last) / (far - near)
+        return np.array([2 / width * column - w, w - 2 / height * row, depth, w])
+
+    @property
+    def wall_distance(self) -> float:
+        """World distance of the eye, which is at a point, from the wall's plane."""
+        wall = self.wall
+        normal = np.cross(wall.lower_right - wall.lower_left, wall.upper_left - wall.lower_left)
+        return float(abs((self.eye.position - wall.lower_left) @ normal) / np.linalg.norm(normal))
+
     def project(self, points: Points) -> Points:
         """Pixel coordinates (..., 2) of world points (..., 3); NaN for points not in front of the eye."""
         matrix = self.viewport_from_world

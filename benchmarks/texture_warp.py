@@ -1,0 +1,100 @@
+"""The texture warp beside the software warp: ms of upload and of drawing, and errors, by texture format.
+
+    python benchmarks/texture_warp.py [--sizes 512 1024] [--walls 4] [--repeats 30]
+
+An eye image of a synthetic CT with an intermediate image of `size` pixels, shown on pictures of `size`²: one
+face from without, several from within. *draw* is one wall's share where all walls are drawn one after the
+other; *read* copies the picture back to the processor's memory, which only `render` needs; *total* is a wall's
+share of upload, draw and read. Errors are against the software warp. Last, which warp `--warp auto` is right
+to take here.
+"""
+
+from __future__ import annotations
+
+import argparse
+from statistics import median
+from time import perf_counter
+
+import numpy as np
+from OpenGL import GL
+
+import persp_sw as psw
+from persp_sw.volume.phantoms import synthetic_ct
+from persp_sw.warp.canvas import Canvas
+
+TRANSFER = [(0, (0, 0, 0), 0), (60, (0.9, 0.5, 0.3), 0.02), (160, (1, 0.9, 0.8), 0.7), (255, (1, 1, 1), 1)]
+
+
+def ms(function, repeats: int) -> float:
+    """Median milliseconds of calls, OpenGL's work included; the first two warm up."""
+    times = []
+    for _ in range(repeats + 2):
+        GL.glFinish()
+        start = perf_counter()
+        function()
+        GL.glFinish()
+        times.append(1e3 * (perf_counter() - start))
+    return median(times[2:])
+
+
+def case(size: int, inside: bool, options) -> tuple[float, float]:
+    """Print one case; returns a wall's ms by software and by the best texture, reading back included."""
+    volume = psw.Volume(synthetic_ct(options.volume).data)
+    settings = psw.Settings(intermediate_size=size)
+    renderer = psw.Renderer(volume, psw.TransferFunction(TRANSFER, 1.0), settings)
+    reach = 0.35 if inside else 1.6
+    eye = volume.centre + reach * max(volume.extent) * np.array([0.3, -0.8, 0.52])
+    view = psw.View.look_at(eye, volume.centre, (0, 0, 1), 90 if inside else 42, (size, size))
+    image = renderer.composite(view.eye, [view.wall])
+    canvas = Canvas(size, size)
+    truth = renderer.warp(image, view, canvas).copy()
+    software = ms(lambda: renderer.warp(image, view, canvas), options.repeats)
+    covered = (truth[..., 3] > 0).mean()
+    faces = "+".join("×".join(map(str, face.size)) for face in image.faces)
+    print(f"\n{size}², {len(image.faces)} face(s) {faces}, {covered:.0%} covered")
+    print("            upload   draw  +depth   read  total   max error  mean error")
+    print(f"  software         {software:7.2f}                 {software:6.2f}")
+    target = psw.OffscreenContext.framebuffer(options.context, size, size)
+    best = np.inf
+    for precision in psw.TextureWarp.PRECISIONS[1:]:
+        with psw.TextureWarp(precision) as warp:
+            upload = ms(lambda warp=warp: warp.upload(image), options.repeats)
+            target.clear()
+            warp.draw_view(view)
+            picture = target.read()
+            error = np.abs(picture - truth)
+            walls = range(options.walls)
+            flat = ms(lambda warp=warp: [warp.draw_view(view) for _ in walls], options.repeats) / len(walls)
+            depth = ms(
+                lambda warp=warp: [warp.draw_view(view, near=1, far=1e4) for _ in walls], options.repeats
+            ) / len(walls)
+        read = ms(target.read, options.repeats)
+        total = upload / len(walls) + flat + read
+        best = min(best, upload + flat + read)
+        print(
+            f"  {precision:8}{upload:9.2f}{flat:7.2f}{depth:8.2f}{read:7.2f}{total:7.2f}"
+            f"{error.max():12.1e}{error.mean():12.1e}",
+            flush=True,
+        )
+    target.close()
+    return software, best
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--sizes", type=int, nargs="+", default=[512, 1024])
+    parser.add_argument("--volume", type=int, default=128, help="voxels an edge")
+    parser.add_argument("--walls", type=int, default=4, help="walls that one upload serves")
+    parser.add_argument("--repeats", type=int, default=30)
+    options = parser.parse_args()
+    with psw.OffscreenContext() as options.context:
+        print(options.context.renderer)
+        rows = [case(size, inside, options) for size in options.sizes for inside in (False, True)]
+    wins = sum(texture < software for software, texture in rows)
+    print(f"\n--warp auto: texture is faster in {wins} of {len(rows)} cases (one wall, read back)")
+
+
+if __name__ == "__main__":
+    main()

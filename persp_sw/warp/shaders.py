@@ -1,0 +1,152 @@
+"""The shaders of the texture warp, OpenGL 3.3."""
+
+from __future__ import annotations
+
+MOST_FACES = 6
+MOST_CORNERS = 8
+MOST_PLANES = 16  # further ones are left out: the depth is then the middle of a longer piece of the ray
+
+_HEADER = "#version 330 core\n"
+
+# The outline is without depth: no near or far plane clips it, and the depth is each fragment's own.
+_VERTEX = f"""
+uniform vec2 outline[{MOST_CORNERS}];
+out vec2 ndc;
+
+void main() {{
+    ndc = outline[gl_VertexID];
+    gl_Position = vec4(ndc, 0.0, 1.0);
+}}
+"""
+
+# Depth that OpenGL would give clip-space z and w, but clamped to the range and never clipped.
+_DEPTH = """
+uniform vec2 window_from_depth;  // scale and offset of z / w; the range follows
+
+float window_depth(vec2 zw) {
+    float depth = zw.y > 0.0 ? zw.x / zw.y * window_from_depth.x + window_from_depth.y : 0.0;
+    return clamp(depth, 0.0, 1.0) * gl_DepthRange.diff + gl_DepthRange.near;
+}
+"""
+
+# Each fragment asks every face where its ray meets it, and takes the face on which that is nearest to the
+# middle: the ray's largest component, and one face only, whatever the rounding.
+_FACES = f"""
+const float OWN = 1.00001;        // faces of several show tangents up to 1
+const float SLACK = 1.0 / 64.0;   // pixels of rounding
+const float EVERYWHERE = 1e30;
+
+in vec2 ndc;
+out vec4 colour;
+uniform sampler2DArray texels;
+uniform mat3 face_from_ndc[{MOST_FACES}];
+uniform vec2 last[{MOST_FACES}];     // size − 1
+#ifdef SEVERAL
+uniform int faces;
+uniform vec2 middle[{MOST_FACES}];   // tangents
+uniform float pitch;
+#endif
+#ifdef DEPTH
+uniform mat3 start_from_face;
+uniform mat3 object_from_face[{MOST_FACES}];
+uniform vec3 low, high;              // the box, relative to where rays start
+uniform int planes;
+uniform vec4 plane[{MOST_PLANES}];
+uniform mat3 world_from_object;
+uniform float nearest;               // world distance
+uniform mat4x2 depth_from_object;
+
+// Clip z, w half-way on the piece of the ray that the colour comes from.
+vec2 middle_of_ray(vec3 start, vec3 along) {{
+    along = mix(along, vec3(1e-9), lessThan(abs(along), vec3(1e-9)));
+    vec3 one = (low - start) / along, other = (high - start) / along;
+    vec3 enter = min(one, other), leave = max(one, other);
+    float from = max(max(enter.x, enter.y), enter.z), to = min(min(leave.x, leave.y), leave.z);
+#ifndef PARALLEL
+    from = max(from, nearest / length(world_from_object * along));
+#endif
+    for (int n = 0; n < planes; n++) {{
+        float slope = dot(plane[n].xyz, along), at = -(dot(plane[n].xyz, start) + plane[n].w) / slope;
+        if (slope > 0.0) from = max(from, at);
+        else if (slope < 0.0) to = min(to, at);
+    }}
+    return depth_from_object * vec4(start + 0.5 * (from + to) * along, 1.0);
+}}
+#endif
+
+void main() {{
+    int face = 0;
+#ifdef SEVERAL
+    float best = EVERYWHERE;
+    vec2 place = vec2(0.0);
+    for (int n = 0; n < faces; n++) {{
+        vec3 point = face_from_ndc[n] * vec3(ndc, 1.0);
+        if (point.z > 0.0) {{
+            vec2 found = point.xy / point.z, tangents = abs(middle[n] + pitch * found);
+            float steepest = max(tangents.x, tangents.y);
+            if (steepest < best) {{ best = steepest; face = n; place = found; }}
+        }}
+    }}
+    if (best > OWN) discard;
+#else
+    vec3 point = face_from_ndc[0] * vec3(ndc, 1.0);
+    if (!(point.z > 0.0)) discard;
+    vec2 place = point.xy / point.z;
+#endif
+    vec2 size = last[face], at = place + 0.5 * size;
+    if (any(lessThan(at, vec2(-SLACK))) || any(greaterThan(at, size + SLACK))) discard;
+#ifdef EXACT
+    // A texture unit's own filter has weights of 8 bits on most hardware.
+    at = clamp(at, vec2(0.0), size);
+    vec2 corner = min(floor(at), size - 1.0), share = at - corner;
+    ivec3 texel = ivec3(corner, face);
+    vec4 above = mix(texelFetch(texels, texel, 0), texelFetch(texels, texel + ivec3(1, 0, 0), 0), share.x);
+    vec4 under = mix(texelFetch(texels, texel + ivec3(0, 1, 0), 0),
+                     texelFetch(texels, texel + ivec3(1, 1, 0), 0), share.x);
+    colour = mix(above, under, share.y);
+#else
+    vec2 texture_size = vec2(textureSize(texels, 0).xy);
+    colour = textureLod(texels, vec3((clamp(at, vec2(0.0), size) + 0.5) / texture_size, face), 0.0);
+#endif
+#ifdef DEPTH
+    vec3 where = vec3(place, 1.0);
+    gl_FragDepth = window_depth(middle_of_ray(start_from_face * where, object_from_face[face] * where));
+#endif
+}}
+"""
+
+_PICTURE = """
+in vec2 ndc;
+out vec4 colour;
+uniform sampler2D picture;
+#ifdef DEPTH
+uniform float clip_depth;
+#endif
+
+void main() {
+    ivec2 size = textureSize(picture, 0);
+    vec2 at = vec2(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y);  // row 0 on top
+    colour = texelFetch(picture, clamp(ivec2(floor(at * vec2(size))), ivec2(0), size - 1), 0);
+#ifdef DEPTH
+    gl_FragDepth = window_depth(vec2(clip_depth, 1.0));
+#endif
+}
+"""
+
+
+def face_sources(options: frozenset[str]) -> tuple[str, str]:
+    """Vertex and fragment shader that draw faces of an eye image.
+
+    Options: SEVERAL faces; PARALLEL rays; DEPTH of each ray (else none); EXACT filtering in float32.
+    """
+    return _HEADER + _VERTEX, _source(_FACES, options)
+
+
+def picture_sources(options: frozenset[str]) -> tuple[str, str]:
+    """Vertex and fragment shader that draw a picture as it is; option DEPTH: at one depth."""
+    return _HEADER + _VERTEX, _source(_PICTURE, options)
+
+
+def _source(body: str, options: frozenset[str]) -> str:
+    defines = "".join(f"#define {name}\n" for name in sorted(options))
+    return _HEADER + defines + (_DEPTH if "DEPTH" in options else "") + body
