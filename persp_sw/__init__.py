@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .volume.grid import Volume
     from .warp.canvas import Canvas
     from .warp.context import OffscreenContext
+    from .warp.framebuffer import Framebuffer
     from .warp.texture import TextureWarp
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "Cut",
     "Eye",
     "EyeImage",
+    "Framebuffer",
     "OffscreenContext",
     "PerspSWError",
     "Regions",
@@ -53,6 +55,7 @@ _HOME = {
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
+    "Framebuffer": ".warp.framebuffer",
     "OffscreenContext": ".warp.context",
     "PerspSWError": ".errors",
     "Regions": ".geometry.regions",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass, field
+from itertools import product
 from zipfile import BadZipFile
 
 import numpy as np
@@ -70,6 +71,18 @@ class EyeImage:
         matrix = self.world_from_object[:3, list(STANDARD_AXES[face.axis])].copy()
         matrix[:, 2] *= face.sign
         return matrix
+
+    def clip_depth(self, clip_from_world: Matrix) -> float:
+        """One depth z / w for a picture of all that is shown: half-way between its box's ends.
+
+        What lies wholly before the box has less, what lies wholly behind it more. −1, the near plane's, where
+        the box is not wholly in front of the eye or not known.
+        """
+        if not np.isfinite(self.box).all():
+            return -1.0
+        corners = np.array(list(product(*self.box.T, (1.0,))))
+        z, w = (np.asarray(clip_from_world) @ self.world_from_object @ corners.T)[2:]
+        return float((z / w).min() + (z / w).max()) / 2 if (w > 0).all() else -1.0
 
     def to_bytes(self) -> bytes:
         """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from data_folder import DATA
+from gl_context import clean_offscreen_context
 from samples import ball
 
 SEED = 2001
@@ -24,6 +26,13 @@ def pytest_report_header() -> str:
 def rng() -> np.random.Generator:
     """The same numbers in every run."""
     return np.random.default_rng(SEED)
+
+
+@pytest.fixture
+def gl_context() -> Iterator[object]:
+    """A current `OffscreenContext` without OpenGL errors, before and after."""
+    with clean_offscreen_context() as context:
+        yield context
 
 
 @pytest.fixture

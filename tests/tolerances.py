@@ -70,6 +70,23 @@ WARP_LINEAR = 2e-6
 # Bilinear weights of float32 (positions of up to a few hundred pixels are float64) on values in 0 … 1.
 WARP_TWIN = 1e-6
 
+# --- Texture warp -----------------------------------------------------------------------------------------
+
+# Places in a face, up to 150 pixels from its middle, take about six roundings of 6e-8: 6e-5 of a pixel, of
+# which neighbours differ by at most 1.
+TEXTURE_FLOAT32 = 1e-4
+
+# Half precision rounds values below 1 by 2^-12; a texture unit's weights have 8 bits along each axis, which
+# rounds them by 2^-9, of neighbours that differ by less than 1/2.
+TEXTURE_FLOAT16 = 2**-12 + 2 * 2**-9 / 2
+
+# Rounded to 1/255 when stored, and once more along each axis where the unit's filter works with 8 bits; the
+# weights' share as above.
+TEXTURE_RGBA8 = 1.5 / 255 + 2 * 2**-9 / 2
+
+# One rounding in mixing equal numbers.
+TEXTURE_CONSTANT = 3e-7
+
 # --- Pictures ---------------------------------------------------------------------------------------------
 
 # Quality 1, a pixel a voxel, volumes of 64³ in 96² pixels. Smooth transfer functions: what users are

@@ -13,7 +13,8 @@ def drawing() -> Iterator[None]:
     """Within, OpenGL draws filled polygons laid over what is there, premultiplied and linear.
 
     Left as they are: framebuffer, viewport, scissor, stencil and colour mask, which say where the host wants
-    pictures, and its depth function's direction; depths are tested, never written. Afterwards all is as before.
+    pictures, and whether nearer depths are less or greater; depths are tested, never written. Afterwards all
+    is as it was.
     """
     gl = opengl()
     on = gl.GL_BLEND, gl.GL_FRAMEBUFFER_SRGB

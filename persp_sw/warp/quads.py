@@ -1,9 +1,9 @@
 """The faces of an eye image as quads in the world, and what a shader must know to draw them.
 
-A face is a rectangle in a plane of slices at any distance D from the eye (DESIGN section 3). An ordinary matrix
-clip_from_world shows it; drawn for the eye that the image was made for, the picture is the same for every D.
-Only an eye that has moved since sees the plane itself; then it is best at the harmonic mean of the nearest
-and the farthest depth.
+A face is a rectangle in a plane of slices at any distance D from the eye (DESIGN section 3). An ordinary
+matrix clip_from_world shows it; drawn for the eye that the image was made for, the picture is the same for
+every D. Only an eye that has moved since sees the plane itself; then it is best at the harmonic mean of the
+nearest and the farthest depth.
 
 A quad is not handed to OpenGL as such, for the near and far planes of a wall would clip it, and clipped quads
 of several faces may crack. Instead the quads are clipped to the window here, in float64, and the shader gets

@@ -47,7 +47,9 @@ uniform vec2 middle[{MOST_FACES}];   // tangents
 uniform float pitch;
 #endif
 #ifdef DEPTH
+#ifdef PARALLEL
 uniform mat3 start_from_face;
+#endif
 uniform mat3 object_from_face[{MOST_FACES}];
 uniform vec3 low, high;              // the box, relative to where rays start
 uniform int planes;
@@ -62,14 +64,16 @@ vec2 middle_of_ray(vec3 start, vec3 along) {{
     vec3 one = (low - start) / along, other = (high - start) / along;
     vec3 enter = min(one, other), leave = max(one, other);
     float from = max(max(enter.x, enter.y), enter.z), to = min(min(leave.x, leave.y), leave.z);
-#ifndef PARALLEL
+#ifdef NEAR
     from = max(from, nearest / length(world_from_object * along));
 #endif
+#ifdef PLANES
     for (int n = 0; n < planes; n++) {{
         float slope = dot(plane[n].xyz, along), at = -(dot(plane[n].xyz, start) + plane[n].w) / slope;
         if (slope > 0.0) from = max(from, at);
         else if (slope < 0.0) to = min(to, at);
     }}
+#endif
     return depth_from_object * vec4(start + 0.5 * (from + to) * along, 1.0);
 }}
 #endif
@@ -109,8 +113,11 @@ void main() {{
     colour = textureLod(texels, vec3((clamp(at, vec2(0.0), size) + 0.5) / texture_size, face), 0.0);
 #endif
 #ifdef DEPTH
-    vec3 where = vec3(place, 1.0);
-    gl_FragDepth = window_depth(middle_of_ray(start_from_face * where, object_from_face[face] * where));
+    vec3 where = vec3(place, 1.0), start = vec3(0.0);
+#ifdef PARALLEL
+    start = start_from_face * where;
+#endif
+    gl_FragDepth = window_depth(middle_of_ray(start, object_from_face[face] * where));
 #endif
 }}
 """
@@ -137,7 +144,8 @@ void main() {
 def face_sources(options: frozenset[str]) -> tuple[str, str]:
     """Vertex and fragment shader that draw faces of an eye image.
 
-    Options: SEVERAL faces; PARALLEL rays; DEPTH of each ray (else none); EXACT filtering in float32.
+    Options: SEVERAL faces; PARALLEL rays; EXACT filtering in float32; DEPTH of each ray (else none), with a
+    NEAR distance and PLANES of regions if there are.
     """
     return _HEADER + _VERTEX, _source(_FACES, options)
 

@@ -13,9 +13,9 @@ from ..eye_image import EyeImage
 from ..geometry.view import View
 from . import shaders
 from .context import opengl
+from .gl_objects import Program, Texture
 from .gl_state import drawing, uploading
 from .quads import Quads, Shown
-
 
 _VIEWPORT = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], np.float32)
 # Depths of a view that says none: as parts of the wall's distance from the eye.
@@ -48,8 +48,8 @@ class TextureWarp:
             raise GraphicsError(f"precision is one of {', '.join(self.PRECISIONS)}; given {precision!r}")
         self.precision = "float32" if precision == "auto" else precision
         self._slots: dict[str, _Slot] = {}
-        self._programs: dict[tuple[str, frozenset[str]], _Program] = {}
-        self._picture: _Texture | None = None
+        self._programs: dict[tuple[str, frozenset[str]], Program] = {}
+        self._picture: Texture | None = None
 
     def upload(self, image: EyeImage, slot: str = "") -> None:
         """Take an eye image into a slot, in place of what was in it; its texture is used again.
@@ -63,7 +63,7 @@ class TextureWarp:
             if image.faces:
                 width, height = (max(face.size[axis] for face in image.faces) for axis in (0, 1))
                 size = (width, height, len(image.faces))
-                texture = _Texture.fitting(texture, self.precision, size)
+                texture = Texture.fitting(texture, self.precision, size)
                 for number in range(len(image.faces)):
                     texture.fill(image.face_pixels(number), number)
         self._slots[slot] = _Slot(image, Quads(image), texture)
@@ -101,6 +101,10 @@ class TextureWarp:
         depth = depth_test and held.quads.bounded
         options = {"SEVERAL": len(held.image.faces) > 1, "PARALLEL": held.image.eye.is_at_infinity}
         options |= {"DEPTH": depth, "EXACT": self.precision == "float32"}
+        options |= {
+            "NEAR": depth and held.image.eye.near > 0,
+            "PLANES": depth and len(held.image.half_spaces) > 0,
+        }
         with drawing():
             program = self._use(shaders.face_sources, options)
             program.set(**_face_uniforms(held, shown, options))
@@ -128,14 +132,14 @@ class TextureWarp:
             (h, w, 4) float32, linear, premultiplied, row 0 on top; pixel by pixel where the viewport is as
             large, else the nearest pixel's.
         clip_depth
-            Depth z / w of all of it, as `depth_of` tells; None: whatever the depths, it is in front.
+            Depth z / w of all of it, as `EyeImage.clip_depth` tells; None: it is in front of everything.
         """
         if picture.ndim != 3 or picture.shape[2] != 4 or picture.dtype != np.float32:
             raise ViewError(f"a picture is (h, w, 4) float32; given {picture.dtype} {picture.shape}")
         gl = _ready()
         height, width = picture.shape[:2]
         with uploading():
-            self._picture = _Texture.fitting(self._picture, "float32", (width, height, 0))
+            self._picture = Texture.fitting(self._picture, "float32", (width, height, 0))
             self._picture.fill(np.ascontiguousarray(picture), 0)
         depth = clip_depth is not None
         with drawing():
@@ -160,11 +164,11 @@ class TextureWarp:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _use(self, sources, options: dict[str, bool]) -> _Program:
+    def _use(self, sources, options: dict[str, bool]) -> Program:
         chosen = frozenset(name for name, wanted in options.items() if wanted)
         key = sources.__name__, chosen
         if key not in self._programs:
-            self._programs[key] = _Program(*sources(chosen))
+            self._programs[key] = Program(*sources(chosen))
         program = self._programs[key]
         if not opengl().glIsProgram(program.name):
             raise GraphicsError(
@@ -179,116 +183,7 @@ class TextureWarp:
 class _Slot:
     image: EyeImage
     quads: Quads
-    texture: _Texture | None
-
-
-class _Texture:
-    """A picture (depth 0) or a stack of them, in OpenGL's memory."""
-
-    def __init__(self, precision: str, size: tuple[int, int, int]):
-        gl = opengl()
-        self.precision, self.size = precision, size
-        self._target = gl.GL_TEXTURE_2D_ARRAY if size[2] else gl.GL_TEXTURE_2D
-        stored, self._type, self._filter = {
-            "float32": (gl.GL_RGBA32F, gl.GL_FLOAT, gl.GL_NEAREST),
-            "float16": (gl.GL_RGBA16F, gl.GL_HALF_FLOAT, gl.GL_LINEAR),
-            "rgba8": (gl.GL_RGBA8, gl.GL_UNSIGNED_BYTE, gl.GL_LINEAR),
-        }[precision]
-        largest = int(gl.glGetIntegerv(gl.GL_MAX_TEXTURE_SIZE))
-        if max(size[:2]) > largest:
-            raise GraphicsError(
-                f"an eye image of {size[0]}×{size[1]} pixels is larger than OpenGL's textures here, {largest}: "
-                "lower the quality or max_intermediate"
-            )
-        self.name = gl.glGenTextures(1)
-        self.bind()
-        form = self._target, 0, stored
-        if size[2]:
-            gl.glTexImage3D(*form, *size, 0, gl.GL_RGBA, self._type, None)
-        else:
-            gl.glTexImage2D(*form, *size[:2], 0, gl.GL_RGBA, self._type, None)
-        for key in (gl.GL_TEXTURE_MIN_FILTER, gl.GL_TEXTURE_MAG_FILTER):
-            gl.glTexParameteri(self._target, key, self._filter)
-        for key in (gl.GL_TEXTURE_WRAP_S, gl.GL_TEXTURE_WRAP_T):
-            gl.glTexParameteri(self._target, key, gl.GL_CLAMP_TO_EDGE)
-        gl.glTexParameteri(self._target, gl.GL_TEXTURE_MAX_LEVEL, 0)
-
-    @classmethod
-    def fitting(cls, old: _Texture | None, precision: str, size: tuple[int, int, int]) -> _Texture:
-        """The old one if it holds so much and not far more, else a new one in its place.
-
-        A picture's size must be its own.
-        """
-        if old is not None:
-            fits = (
-                old.size == size if not size[2] else all(a >= b for a, b in zip(old.size, size, strict=True))
-            )
-            if fits and np.prod(old.size) <= 4 * np.prod(size):
-                return old
-            old.delete()
-        return cls(precision, size)
-
-    def fill(self, pixels: Image, layer: int) -> None:
-        gl = opengl()
-        self.bind()
-        height, width = pixels.shape[:2]
-        data = _stored(pixels, self.precision)
-        if self.size[2]:
-            corner = 0, 0, layer, width, height, 1
-            gl.glTexSubImage3D(self._target, 0, *corner, gl.GL_RGBA, self._type, data)
-        else:
-            gl.glTexSubImage2D(self._target, 0, 0, 0, width, height, gl.GL_RGBA, self._type, data)
-
-    def bind(self) -> None:
-        opengl().glBindTexture(self._target, self.name)
-
-    def delete(self) -> None:
-        opengl().glDeleteTextures([self.name])
-
-
-class _Program:
-    """A linked program and where its uniforms are."""
-
-    def __init__(self, vertex: str, fragment: str):
-        gl = opengl()
-        parts = []
-        for kind, source in ((gl.GL_VERTEX_SHADER, vertex), (gl.GL_FRAGMENT_SHADER, fragment)):
-            part = gl.glCreateShader(kind)
-            gl.glShaderSource(part, source)
-            gl.glCompileShader(part)
-            parts.append(part)
-        self.name = gl.glCreateProgram()
-        for part in parts:
-            gl.glAttachShader(self.name, part)
-        gl.glLinkProgram(self.name)
-        logs = [gl.glGetShaderInfoLog(part) for part in parts] + [gl.glGetProgramInfoLog(self.name)]
-        for part in parts:
-            gl.glDetachShader(self.name, part)
-            gl.glDeleteShader(part)
-        if not gl.glGetProgramiv(self.name, gl.GL_LINK_STATUS):
-            text = " ".join(log.decode(errors="replace") if isinstance(log, bytes) else log for log in logs)
-            raise GraphicsError(f"this OpenGL does not take our shaders: {text.strip()}")
-        self._places: dict[str, int] = {}
-
-    def set(self, **values: NDArray | np.generic) -> None:
-        """Uniforms by name; int32 and float32 numbers, (n, k) vectors, (n, rows, columns) matrices."""
-        gl = opengl()
-        for name, value in values.items():
-            place = self._places.get(name)
-            if place is None:
-                place = self._places[name] = gl.glGetUniformLocation(self.name, name)
-            if place < 0:  # unused in this variant
-                continue
-            if isinstance(value, np.generic):
-                (gl.glUniform1i if value.dtype == np.int32 else gl.glUniform1f)(place, value.item())
-                continue
-            value = np.ascontiguousarray(value, np.float32)
-            if value.ndim == 2:
-                functions = {2: gl.glUniform2fv, 3: gl.glUniform3fv, 4: gl.glUniform4fv}
-                functions[value.shape[1]](place, len(value), value)
-            else:
-                functions = {(3, 3): gl.glUniformMatrix3fv, (2, 4): gl.glUniformMatrix4x2fv}
-                functions[value.shape[1:]](place, len(value), gl.GL_TRUE, value)
+    texture: Texture | None
 
 
 def _ready():
@@ -302,16 +197,6 @@ def _ready():
     if not text[0].isdigit() or (int(numbers[0]), int(numbers[1])) < (3, 3):
         raise GraphicsError(f"the texture warp needs OpenGL 3.3; the current context is {text!r}")
     return gl
-
-
-def _stored(pixels: Image, precision: str) -> NDArray:
-    if precision == "float32":
-        return pixels
-    if precision == "float16":
-        return pixels.astype(np.float16)
-    scaled = np.multiply(pixels, np.float32(255))
-    scaled += np.float32(0.5)
-    return np.clip(scaled, 0, 255, out=scaled).astype(np.uint8)
 
 
 def _face_uniforms(held: _Slot, shown: Shown, options: dict[str, bool]) -> dict[str, NDArray | np.generic]:
@@ -341,7 +226,7 @@ def _face_uniforms(held: _Slot, shown: Shown, options: dict[str, bool]) -> dict[
     return uniforms
 
 
-def _draw(gl, program: _Program, outline: NDArray, depth: bool) -> None:
+def _draw(gl, program: Program, outline: NDArray, depth: bool) -> None:
     """Fill a convex polygon; with a vertex array of the moment, for contexts do not share them."""
     program.set(outline=outline)
     if depth:
