@@ -94,19 +94,21 @@ def meets(image, view):
     "precision, bound",
     [("float32", TEXTURE_FLOAT32), ("float16", TEXTURE_FLOAT16), ("rgba8", TEXTURE_RGBA8)],
 )
-@pytest.mark.parametrize("distance, single, faces", [(1.7, 3, {1}), (0.9, 1, {2, 3, 4}), (0.2, 3, {4, 5, 6})])
+@pytest.mark.parametrize("distance, single, faces", [(1.7, 3, 1), (0.9, 1, 3), (0.2, 3, 5)])
 def test_the_picture_is_the_software_warps(gl_context, volume, precision, bound, distance, single, faces):
     """One face, several from without, several from within; over black and over a colour."""
+    counts = set()
     with TextureWarp(precision) as warp:
         for towards in DIRECTIONS:
             view = view_of(volume, towards, distance, fovy=100 if distance < 1 else 60, size=(130, 97))
             image, truth = pictures(volume, view, single_face_tangent=single)
             assert truth[..., 3].max() > 0.5
-            assert len(image.faces) in faces | {min(faces) - 1} and max(faces) > 0
+            counts.add(len(image.faces))
             warp.upload(image)
             assert np.abs(drawn(lambda v=view: warp.draw_view(v), view.size) - truth).max() < bound
             picture = drawn(lambda v=view: warp.draw_view(v), view.size, OPAQUE)
             assert np.abs(picture - over(truth, OPAQUE)).max() < 2 * bound
+    assert max(counts) == faces
 
 
 def test_parallel_views_too(warp, volume):

@@ -92,6 +92,14 @@ _SETTING_OPTIONS = [
     click.option("--threads", type=int, metavar="N", help="Threads; all cores by default."),
 ]
 
+warp_option = click.option(
+    "--warp",
+    type=click.Choice(["auto", "texture", "software"]),
+    default="auto",
+    show_default=True,
+    help="What draws the eye image: OpenGL, the processor, or whichever is faster here.",
+)
+
 
 def volume_options(function: Function) -> Function:
     """Which volume of a file, and how to read a raw one."""

@@ -18,6 +18,7 @@ from .options import (
     setting_options,
     view_options,
     volume_options,
+    warp_option,
 )
 from .output import byte_size, numbers, print_facts, print_json, progress_bars
 
@@ -60,6 +61,7 @@ comes before them. --quality and --samples change speed and error, never the loo
     default=None,
     help="All values on a ray count, or only those at samples; by the transfer function where not said.",
 )
+@warp_option
 @setting_options
 @view_options
 @region_options
@@ -72,6 +74,7 @@ def render(
     tolerance: float,
     intermediate: int | None,
     preintegrated: bool | None,
+    warp: str,
     quality: float,
     samples: str | None,
     residual: float,
@@ -97,7 +100,10 @@ def render(
             threads=threads,
             intermediate_size=intermediate,
         )
-        values = {"scene": scene, **shoot(chosen, path, settings, tolerance if judge else None, progress)}
+        values = {
+            "scene": scene,
+            **shoot(chosen, path, settings, tolerance if judge else None, progress, warp),
+        }
     say_missing_voxels(chosen.volume)
     if as_json:
         print_json(values)
@@ -105,10 +111,18 @@ def render(
         _print(values)
 
 
-def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, progress: Any) -> dict[str, Any]:
+def shoot(
+    scene: Scene,
+    path: Path,
+    settings: Any,
+    tolerance: float | None,
+    progress: Any,
+    warp: str = "software",
+) -> dict[str, Any]:
     """Render and time `scene`, write its picture to `path`; judge it where a `tolerance` is given."""
     from ..renderer import Renderer
     from .shots import MIN_FRAMES, Judgement, time_frames, write_judgement
+    from .warps import WarpChoice
 
     volume = scene.volume
     views = scene.views()
@@ -116,7 +130,8 @@ def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, prog
         views = [views[0]] * (1 + max(scene.frames, MIN_FRAMES))
     renderer = Renderer(volume, scene.transfer, settings, scene.regions, progress)
     progress(0, len(views), "rendering")
-    timing = time_frames(renderer, views, scene.max_seconds)
+    with WarpChoice(renderer, warp, views[0].size) as drawn:
+        timing = time_frames(drawn, views, scene.max_seconds)
     progress(len(views), len(views), "rendering")
     images.write(path, timing.image, scene.background)
     values = {
@@ -127,6 +142,7 @@ def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, prog
         "preset": scene.preset.name if scene.preset else None,
         "quality": settings.quality,
         **timing.report(),
+        "warp": drawn.name,
         "dense_bytes": volume.data.nbytes,
     }
     if tolerance is not None:
@@ -145,12 +161,13 @@ def shoot(scene: Scene, path: Path, settings: Any, tolerance: float | None, prog
 
 def _print(values: dict[str, Any]) -> None:
     faces, threads = values["faces"], values["threads"]
+    warp = f"{values['warp']} warp {values['warp_ms']:.1f}"
     compiled = f", compile {values['compile_ms']:.0f}" if values["compile_ms"] else ""
     rows = {
         "picture": f"{values['out']}, {numbers(values['size'])} pixels",
         "preset": values["preset"] or "the scene's own transfer function",
         "time": f"{values['ms']:.1f} ms a frame, median of {values['timed_frames']} (composite "
-        f"{values['composite_ms']:.1f}, warp {values['warp_ms']:.1f}), {threads} thread{'s' * (threads > 1)}",
+        f"{values['composite_ms']:.1f}, {warp}), {threads} thread{'s' * (threads > 1)}",
         "once": f"first frame {values['first_ms']:.0f} ms (encode {values['encode_ms']:.0f}{compiled})",
         "eye image": f"{faces} face{'s' * (faces != 1)}, {numbers(values['intermediate_size'])} pixels, "
         f"{values['samples']:,} samples",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from time import perf_counter
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -70,7 +70,17 @@ class Timing:
         }
 
 
-def time_frames(renderer: Renderer, views: Sequence[View], max_seconds: float | None = None) -> Timing:
+class Draws(Protocol):
+    """What makes pictures: a `Renderer`, or one with another warp."""
+
+    last: dict[str, Any]
+
+    def render(self, view: View, out: Canvas | None = None) -> Image:
+        """As `Renderer.render`."""
+        ...
+
+
+def time_frames(renderer: Draws, views: Sequence[View], max_seconds: float | None = None) -> Timing:
     """Render `views[0]` to warm up, then time the others in order.
 
     Parameters

@@ -180,6 +180,7 @@ class OffscreenContext:
 @cache
 def _load_egl() -> Any:
     """libEGL, its functions' types declared."""
+    os.environ.setdefault("EGL_LOG_LEVEL", "fatal")  # Mesa tells of every graphics device it cannot use
     for name in ("libEGL.so.1", "libEGL.so", "libEGL.dll", "libEGL.dylib"):
         try:
             egl = ctypes.CDLL(name)
