@@ -16,7 +16,12 @@ def volume_path(name: str) -> Path:
 
     The folder is named by the environment variable PERSP_SW_DATA, else `../shared/data` beside the project.
     """
-    path = DATA / "volumes" / name
+    return data_path("volumes", name)
+
+
+def data_path(folder: str, name: str) -> Path:
+    """Path of any file in the data folder; skips the test where it is absent."""
+    path = DATA / folder / name
     if not path.is_file():
         pytest.skip(f"{path} is absent; set PERSP_SW_DATA to the data folder")
     return path

@@ -154,3 +154,10 @@ NO_POP = 1.5
 # Part of the flicker's energy that is left: noise loses (3/8)² or more across the rays at pixels four voxels
 # apart, 0.05 measured; a checkerboard nearly all, 0.01.
 FLICKER = 0.1
+
+# --- Tracking ---------------------------------------------------------------------------------------------
+
+# Prediction over times of 5 … 80 ms, of a motion with angular frequencies of up to 5 rad/s: the next term of
+# the error is 5 rad/s · 80 ms = 0.4 of the first at the coarsest, which bends a slope over four halvings by
+# about a tenth.
+PREDICTION_ORDER = 0.1

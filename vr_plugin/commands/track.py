@@ -21,7 +21,7 @@ from persp_sw.commands.output import console, plain
 from ..pose import Pose, rotation_of
 from ..trackers import MouseTracker, PathTracker, Recording, Sample, Tracker, TrackerError
 from ..trackers.addresses import LOOPBACK, host_and_port, place_of
-from ..trackers.dtrack import FLYSTICK
+from ..trackers.dtrack_samples import FLYSTICK
 from ..trackers.opening import open_tracker
 from ..trackers.statistics import Statistics
 from ..trackers.terminal import TerminalEvents, terminal_input
@@ -181,7 +181,7 @@ def _report(status: str, statistics: Statistics) -> Group:
     table = Table(box=SIMPLE, padding=(0, 1), pad_edge=False)
     table.add_column("sensor", no_wrap=True)
     table.add_column("kind", no_wrap=True)
-    for heading in ("x, y, z (m)", "yaw, pitch, roll (°)", "Hz", "late (ms)"):
+    for heading in ("x, y, z (m)", "yaw, pitch, roll (°)", "Hz", "late ms"):
         table.add_column(heading, justify="right", no_wrap=True)
     for (sensor, kind), one in sorted(statistics.sensors.items()):
         late = one.latency_s(now)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 WINDOW_S = 10.0
 JUMP_S = 0.5
 PERSIST = 5
+STALL_S = 10.0
 LARGEST_S = 1e11  # some 3000 years; beyond, float64 has no microseconds left
 
 
@@ -19,9 +21,10 @@ class ClockMap:
         Seconds after which a least delay is forgotten, at most twice that: clocks drift against each other by
         up to 1e-4, which is 2 ms in this time.
     jump
-        A stamp that disagrees with the offset by more than this, in seconds, is not believed: it is taken as
-        measured on arrival, until `persist` in a row agree with each other; then the foreign clock has been
-        set (at midnight, say), and a new offset begins.
+        A stamp that disagrees with the offset by more than this, in seconds, is not believed at once. Where
+        `persist` polls in a row agree that it is so, the foreign clock has been set (at midnight, say), and a
+        new offset begins. Until then it is taken as measured on arrival, or, where it is only late by up to
+        10 s, as what it says: a network that stalls brings old messages in one heap.
 
     Accuracy: a mapped stamp is late by the least delay of the last `window` … 2 · `window` seconds, and never
     after its arrival.
@@ -33,12 +36,17 @@ class ClockMap:
         self._least = self._previous = math.inf  # in this window, and in the one before
         self._window_start = -math.inf
         self._strange: list[float] = []
+        self._strange_arrival = -math.inf
 
     @property
     def offset(self) -> float | None:
         """Seconds of ours minus foreign seconds; None before the first stamp."""
         least = min(self._least, self._previous)
         return least if math.isfinite(least) else None
+
+    def all_ours(self, stamps: Sequence[float], arrival: float) -> list[float]:
+        """`ours` of what came together, in its order; the last, which came fastest, tells of the others."""
+        return [self.ours(stamp, arrival) for stamp in reversed(stamps)][::-1]
 
     def ours(self, stamp: float, arrival: float) -> float:
         """When something happened, on our clock.
@@ -57,9 +65,11 @@ class ClockMap:
         if known is not None and abs(offset - known) > self.jump:
             if self._strange and abs(offset - self._strange[-1]) > self.jump:
                 self._strange.clear()
-            self._strange.append(offset)
+            if not self._strange or arrival > self._strange_arrival:
+                self._strange.append(offset)
+                self._strange_arrival = arrival
             if len(self._strange) < self.persist:
-                return arrival
+                return stamp + known if 0 < offset - known < STALL_S else arrival
             self.jumps += 1
             self._previous, self._least = math.inf, min(self._strange)
             self._window_start = arrival

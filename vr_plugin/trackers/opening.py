@@ -8,7 +8,8 @@ from ..pose import Pose
 from ..rig import TrackerPlace
 from .addresses import dtrack_address, vrpn_address
 from .calibration import Calibrated
-from .dtrack import FLYSTICK, DTrack
+from .dtrack import DTrack
+from .dtrack_samples import FLYSTICK
 from .mouse import MouseTracker
 from .recording import PathTracker, Recording
 from .sample import NoTracker, Tracker, TrackerError

@@ -5,13 +5,12 @@ from __future__ import annotations
 import errno
 import logging
 import os
-import select
 import socket
 import threading
 
 from . import vrpn_wire as wire
-from .clock import ClockMap
 from .sample import Sample
+from .vrpn_samples import VrpnSamples
 
 _log = logging.getLogger("persp_sw")
 
@@ -30,13 +29,10 @@ class VrpnClient:
 
     Parameters
     ----------
-    devices
-        Names. Poses come from the first; buttons and axes from all.
+    devices, wand
+        See `VrpnSamples`.
     host, port
         Where the server is. A name is resolved in a thread, for that can take seconds.
-    wand
-        Sensor number that buttons and axes carry, which VRPN does not number; None: the device's place in
-        `devices`.
 
     It connects at the first `poll`; when the server is not there or goes away, it says so once, tries again
     after 0.25, 0.5, … 8 s, and says when it is back. From one poll to the next it takes 128 kB and 1024
@@ -45,7 +41,6 @@ class VrpnClient:
 
     def __init__(self, devices: tuple[str, ...], host: str, port: int = wire.PORT, wand: int | None = None):
         self.devices, self.host, self.port, self.wand = devices, host, port, wand
-        self.damaged = 0  # messages whose content was no pose, no button, no axes
         self.reconnects = 0
         self._status = "not connected yet"
         self._socket: socket.socket | None = None
@@ -109,31 +104,30 @@ class VrpnClient:
         self._state, self._since = "connecting", now
 
     def _connected(self, now: float) -> None:
-        _, writable, failed = select.select([], [self._socket], [self._socket], 0)
-        if not writable and not failed:
-            if now - self._since > CONNECT_S:
-                raise OSError("no answer")
-            return
         code = self._socket.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
         if code:
             raise OSError(code, os.strerror(code))
+        try:
+            self._socket.getpeername()
+        except OSError:
+            if now - self._since > CONNECT_S:
+                raise OSError("no answer") from None
+            return
         # A few hundred bytes always fit into a new connection's buffer.
         self._socket.send(wire.greeting(self.devices, [wire.PING]))
-        self._parser = wire.Parser()
-        self._clocks = {name: ClockMap() for name in self.devices}
-        self._buttons: dict[str, tuple[bool, ...]] = {}
+        self._stream = VrpnSamples(self.devices, self.wand)
         self._state, self._since, self._heard, self._pinged = "greeting", now, now, now
 
     def _read(self, now: float, samples: list[Sample]) -> None:
         left, messages = MAX_BYTES_PER_POLL, MAX_MESSAGES_PER_POLL
         while True:
-            for message in self._parser.messages(messages):
-                messages -= 1
-                self._take(message, now, samples)
-            if self._parser.greeted and self._state == "greeting":
+            count, found = self._stream.read(now, messages)
+            messages -= count
+            samples += found
+            if self._stream.greeted and self._state == "greeting":
                 self._welcome(now)
-            # What is cut off by the limit stays with the parser; nothing is read on top of that.
-            if messages <= 0 or left <= 0 or len(self._parser) > wire.MAX_MESSAGE:
+            # What the limit cuts off waits in the stream; nothing is read on top of that.
+            if messages <= 0 or left <= 0 or self._stream.waiting > wire.MAX_MESSAGE:
                 break
             try:
                 data = self._socket.recv(min(CHUNK, left))
@@ -143,7 +137,7 @@ class VrpnClient:
                 raise OSError("the server has closed the connection")
             self._heard = now
             left -= len(data)
-            self._parser.feed(data)
+            self._stream.feed(data)
         if now - self._since > CONNECT_S:
             if self._state == "greeting":
                 raise OSError("it does not greet")
@@ -153,44 +147,6 @@ class VrpnClient:
         if now - max(self._heard, self._pinged) > PING_AFTER_S:
             self._pinged = now
             self._socket.send(wire.message(0, 0, b""))
-
-    def _take(self, message: wire.Message, now: float, samples: list[Sample]) -> None:
-        if message.sender not in self._clocks:
-            return
-        place = self.devices.index(message.sender)
-        sensor = self.wand if self.wand is not None else place
-        if message.type == wire.POSE and place == 0:
-            content = wire.read_pose(message.payload)
-            made = content and Sample(0.0, content[0], content[1])
-        elif message.type in (wire.BUTTON, wire.BUTTONS):
-            content = self._pressed(message)
-            made = None if content is None else Sample(0.0, sensor, kind="buttons", buttons=content)
-        elif message.type == wire.AXES:
-            content = wire.read_axes(message.payload)
-            made = None if content is None else Sample(0.0, sensor, kind="axes", axes=content)
-        else:
-            return
-        if made is None:
-            self.damaged += 1
-            return
-        stamp = self._clocks[message.sender].ours(message.seconds, now)
-        samples.append(Sample(stamp, made.sensor, made.pose, made.kind, made.buttons, made.axes))
-
-    def _pressed(self, message: wire.Message) -> tuple[bool, ...] | None:
-        """All buttons of a device after a message: one that names a single button changes that."""
-        if message.type == wire.BUTTONS:
-            content = wire.read_buttons(message.payload)
-        else:
-            change = wire.read_button(message.payload)
-            if change is None:
-                return None
-            states = list(self._buttons.get(message.sender, ()))
-            states += [False] * (change[0] + 1 - len(states))
-            states[change[0]] = change[1]
-            content = tuple(states)
-        if content is not None:
-            self._buttons[message.sender] = content
-        return content
 
     def _welcome(self, now: float) -> None:
         self._state, self._since = "live", now
