@@ -97,7 +97,6 @@ class FrameMaker:
         self._room_from_world = np.array(matrix, np.float64)
         self._world_from_room = np.linalg.inv(self._room_from_world)
         self._metres = float(np.cbrt(abs(np.linalg.det(self._room_from_world[:3, :3]))))  # a world unit
-        self._world_walls = {wall.name: self._in_world(wall.wall) for wall in self.walls}
 
     def make(self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE) -> Frame:
         """Composite every eye once, for all the walls that show it.
@@ -117,7 +116,7 @@ class FrameMaker:
             for wall in self.walls:
                 if name in shown[wall.name]:
                     try:
-                        views.append((wall, psw.View(eye, self._world_walls[wall.name])))
+                        views.append((wall, psw.View(eye, self._in_world(wall.in_room(head)))))
                     except ViewError as error:
                         edge_on.append(wall.name)
                         self._say(wall.name, error)

@@ -47,7 +47,9 @@ class Pose:
         if not length > 1e-9:
             raise PoseError(f"a quaternion has a length above 0; given {self.orientation}")
         object.__setattr__(self, "position", position)
-        object.__setattr__(self, "orientation", turn / length)
+        if abs(length - 1) > 1e-12:  # a unit quaternion keeps its bits
+            turn = turn / length
+        object.__setattr__(self, "orientation", turn)
 
     @classmethod
     def from_matrix(cls, matrix: np.ndarray) -> Pose:

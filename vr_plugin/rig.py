@@ -6,19 +6,21 @@ Room space is in metres, right-handed, y up. A viewer at rest mostly looks along
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 import numpy as np
 
 import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
-from .pose import Pose
+from .pose import Pose, multiply, quaternion_of
 
 STEREO_MODES = (
     "mono", "left", "right", "quad", "side_by_side", "top_bottom", "interlaced", "anaglyph",
 )  # fmt: skip
 TRACKER_KINDS = ("none", "vrpn", "dtrack", "path", "mouse")
+FIXED_TO = ("room", "head")
 
 
 class RigError(PerspSWError):
@@ -45,22 +47,34 @@ class RigWall:
     Attributes
     ----------
     wall
-        Three corners in room metres and the pixels of one eye's picture.
+        Three corners in metres, of the room or the head, and the pixels of one eye's picture.
     stereo
         One of `STEREO_MODES`: how its window shows two eyes.
     machine
         The host or display that shows it; empty for this machine.
+    fixed_to
+        One of `FIXED_TO`. A head-mounted display's walls go with the head: their corners are in its axes (x
+        right, y up, z backwards), from the tracked point.
     """
 
     wall: psw.Wall
     stereo: str = "mono"
     window: WindowPlace = WindowPlace()
     machine: str = ""
+    fixed_to: str = "room"
 
     @property
     def name(self) -> str:
         """The wall's name."""
         return self.wall.name
+
+    def in_room(self, room_from_head: Pose) -> psw.Wall:
+        """The wall in room metres, for a head that is there."""
+        w = self.wall
+        if self.fixed_to == "room":
+            return w
+        corners = (room_from_head.apply(c) for c in (w.lower_left, w.lower_right, w.upper_left))
+        return psw.Wall(*corners, pixels=w.pixels, name=w.name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +114,9 @@ class TrackerPlace:
         Numbers of the sensors or bodies; wand None: there is none.
     room_from_tracker
         (4, 4) similarity: the tracker's unit to metres, its axes to the room's.
+    sensor_from_head
+        How the head lies in the axes of the body that is tracked: a body of markers has whatever axes it got
+        when it was taught in. Metres.
     latency
         Seconds from a sample's time stamp to its arrival that prediction adds on top of the display's.
     """
@@ -110,6 +127,19 @@ class TrackerPlace:
     wand: int | None = None
     room_from_tracker: np.ndarray = field(default_factory=lambda: np.eye(4))
     latency: float = 0.0
+    sensor_from_head: Pose = field(default_factory=Pose)
+
+    def room_from_sensor(self, tracker_from_sensor: Pose) -> Pose:
+        """Where a sensor or body is in the room, metres, from its pose as tracked."""
+        matrix = np.asarray(self.room_from_tracker, np.float64)
+        scale = np.cbrt(np.linalg.det(matrix[:3, :3]))
+        position = matrix[:3, :3] @ tracker_from_sensor.position + matrix[:3, 3]
+        turn = multiply(quaternion_of(matrix[:3, :3] / scale), tracker_from_sensor.orientation)
+        return Pose(position, turn)
+
+    def room_from_head(self, tracker_from_sensor: Pose) -> Pose:
+        """Where the head is in the room, from the pose of its sensor as tracked."""
+        return self.room_from_sensor(tracker_from_sensor) @ self.sensor_from_head
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,6 +175,11 @@ class QualityAim:
 class Rig:
     """One installation.
 
+    Attributes
+    ----------
+    recordings
+        Recorded head paths that the rig knows how to place, besides its tracker: `tracker_for` finds them.
+
     Raises
     ------
     RigError
@@ -157,9 +192,11 @@ class Rig:
     placement: Placement = field(default_factory=Placement)
     quality: QualityAim = QualityAim()
     name: str = ""
+    recordings: Sequence[TrackerPlace] = ()
 
     def __post_init__(self):
         object.__setattr__(self, "walls", tuple(self.walls))
+        object.__setattr__(self, "recordings", tuple(self.recordings))
         names = [wall.name for wall in self.walls]
         if not names:
             raise RigError("a rig has at least one wall")
@@ -172,18 +209,23 @@ class Rig:
         """The machines that show walls, in their first wall's order."""
         return tuple(dict.fromkeys(wall.machine for wall in self.walls))
 
+    def tracker_for(self, recording: str | Path) -> TrackerPlace:
+        """How a recorded path is placed: as the rig says for a file of that name, else as its tracker is."""
+        known = [place for place in (self.tracker, *self.recordings) if place.kind == "path"]
+        same = (place for place in known if Path(place.address).name == Path(recording).name)
+        return replace(next(same, self.tracker), kind="path", address=str(recording))
+
     @property
     def corners(self) -> np.ndarray:
-        """(walls, 4, 3) room corners: lower left, lower right, upper right, upper left."""
+        """(walls, 4, 3) room corners: lower left, lower right, upper right, upper left.
+
+        Of walls that go with the head: where they are when it rests.
+        """
+        walls = [wall.in_room(self.eyes.rest_pose) for wall in self.walls]
         return np.array(
             [
-                [
-                    w.wall.lower_left,
-                    w.wall.lower_right,
-                    w.wall.lower_right + w.wall.upper_left - w.wall.lower_left,
-                    w.wall.upper_left,
-                ]
-                for w in self.walls
+                [w.lower_left, w.lower_right, w.lower_right + w.upper_left - w.lower_left, w.upper_left]
+                for w in walls
             ]
         )
 
