@@ -24,11 +24,11 @@ __all__ = ["load_rig", "rig_of_keys", "rig_to_toml"]
 _log = logging.getLogger("persp_sw")
 
 
-def load_rig(path: str | Path) -> Rig:
+def load_rig(path: str | Path, *, warn: bool = True) -> Rig:
     """Read a rig file.
 
     A recording's `address` is taken from the file's own folder where it is there. What is doubtful but can be
-    shown, such as a wall that turns its back on the viewer, is logged as a warning.
+    shown, such as a wall that turns its back on the viewer, is logged as a warning, unless `warn` is false.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def load_rig(path: str | Path) -> Rig:
     """
     path = Path(path)
     rig = rig_of_keys(_read(path), source=f"rig {path}", folder=path.parent)
-    for finding in findings(rig):
+    for finding in findings(rig) if warn else ():
         _log.warning("rig %s: %s", path, finding)
     return rig
 
@@ -115,7 +115,7 @@ def _walls(given: Any) -> tuple[list[RigWall], list[str]]:
 def _found(place: TrackerPlace, folder: Path) -> TrackerPlace:
     beside = folder / place.address
     if place.kind == "path" and beside.is_file():
-        return replace(place, address=str(beside))
+        return replace(place, address=str(beside.absolute()))
     return place
 
 
