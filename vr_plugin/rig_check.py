@@ -63,7 +63,7 @@ class WallMeasures:
         centre = w.lower_left + (across + up) / 2 - eye
         along = across / width
         sight = np.linalg.norm(centre)
-        turned = np.linalg.norm(along - centre * (along @ centre) / max(sight, 1e-300) ** 2)
+        turned = np.linalg.norm(along - centre * (along @ centre) / max(sight, 1e-150) ** 2)
         one = np.degrees(pixel[0] * turned / max(sight, 1e-300))
         return cls(
             (width, height),
