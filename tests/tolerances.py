@@ -161,3 +161,5 @@ FLICKER = 0.1
 # the error is 5 rad/s · 80 ms = 0.4 of the first at the coarsest, which bends a slope over four halvings by
 # about a tenth.
 PREDICTION_ORDER = 0.1
+# Corners within 10 m: sums and products of a few float64 numbers, 1e-15 of their size each.
+RIG_CORNERS = 1e-12
