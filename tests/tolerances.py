@@ -163,3 +163,7 @@ FLICKER = 0.1
 PREDICTION_ORDER = 0.1
 # Corners within 10 m: sums and products of a few float64 numbers, 1e-15 of their size each.
 RIG_CORNERS = 1e-12
+# --- Stereo and presenting --------------------------------------------------------------------------------
+
+# Dubois' matrices have three decimals; six of them sum to a row: 6 · 0.0005 = 0.003.
+NEUTRAL_ANAGLYPH = 3e-3

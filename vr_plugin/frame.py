@@ -15,13 +15,10 @@ from persp_sw.errors import ViewError
 from .eyes import EyePair
 from .pose import Pose
 from .rig import RigWall
+from .stereo import eyes_of
 
 _log = logging.getLogger("persp_sw")
 _NONE: Mapping[str, str] = MappingProxyType({})
-
-# Which eyes a stereo mode needs.
-EYES_OF = {"mono": ("middle",), "left": ("left",), "right": ("right",)}
-BOTH = ("left", "right")
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +106,7 @@ class FrameMaker:
             Stereo modes by wall name, where not the rig's own.
         """
         pictures, images, statistics, edge_on = [], {}, {}, []
-        shown = {wall.name: EYES_OF.get(modes.get(wall.name, wall.stereo), BOTH) for wall in self.walls}
+        shown = {wall.name: eyes_of(modes.get(wall.name, wall.stereo)) for wall in self.walls}
         for name in dict.fromkeys(name for names in shown.values() for name in names):
             eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)
             views = []
