@@ -54,7 +54,11 @@ RESERVED = {
     "llvmlite": {
         f"persp_sw.{name}" for name in ("_jit", "kernels.lanes", "kernels.packet_vector", "kernels.warp")
     },
-    "OpenGL": {"persp_sw.warp.texture", "persp_sw.warp.context", "vr_plugin.present"},
+    # gl_objects: programs, textures and kept state, which present (stereo) and shapes (rooms, text) share.
+    "OpenGL": {
+        *(f"persp_sw.warp.{name}" for name in ("texture", "context")),
+        *(f"vr_plugin.{name}" for name in ("gl_objects", "present", "shapes")),
+    },
     "glfw": {"vr_plugin.window"},
     "imgui_bundle": {"vr_plugin.panel"},
 }
