@@ -1,10 +1,10 @@
-"""What an eye's picture should be drawn in: time and error of the formats of `vr_plugin.present.EyeTarget`.
+"""What an eye's picture should be drawn in: time and error of the formats of `vr_plugin.eye_target`.
 
     python benchmarks/eye_targets.py [--size 1024] [--frames 20]
 
 Draws a smooth picture, half transparent, over the whole target three times, as a volume over a scene,
 composes two targets into a window's bytes in each stereo mode, and prints the median milliseconds and how far
-the screen's values are from those of 32-bit floats, in steps of its 256. Without a screen; on what draws here.
+the screen's values are from those of 32-bit floats, in steps of its 256. Needs no screen.
 """
 
 import argparse
@@ -41,8 +41,9 @@ def main() -> None:
     with psw.OffscreenContext() as context:
         from OpenGL import GL
 
+        from vr_plugin.eye_target import FORMATS, EyeTarget
         from vr_plugin.gl_objects import Texture
-        from vr_plugin.present import FORMATS, Composer, EyeTarget, read_screen
+        from vr_plugin.present import Composer, read_screen
         from vr_plugin.shapes import Shapes
 
         print(f"{context.renderer}, {size[0]} × {size[1]} pixels, median of {options.frames}")

@@ -54,10 +54,11 @@ RESERVED = {
     "llvmlite": {
         f"persp_sw.{name}" for name in ("_jit", "kernels.lanes", "kernels.packet_vector", "kernels.warp")
     },
-    # gl_objects: programs, textures and kept state, which present (stereo) and shapes (rooms, text) share.
+    # gl_objects: programs, textures and kept state, which serve eye_target, present (stereo) and shapes
+    # (rooms, text): each has its own reason to change.
     "OpenGL": {
         *(f"persp_sw.warp.{name}" for name in ("texture", "context")),
-        *(f"vr_plugin.{name}" for name in ("gl_objects", "present", "shapes")),
+        *(f"vr_plugin.{name}" for name in ("eye_target", "gl_objects", "present", "shapes")),
     },
     "glfw": {"vr_plugin.window"},
     "imgui_bundle": {"vr_plugin.panel"},

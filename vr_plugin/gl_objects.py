@@ -239,5 +239,12 @@ class Texture:
             self.name = 0
 
 
+def read_pixels(size: Sequence[int], layout: int, kind: int, number: type, channels: int) -> np.ndarray:
+    """(h, w, channels) of the framebuffer that is bound for reading, row 0 on top; within `kept_state`."""
+    image = np.empty((size[1], size[0], channels), number)
+    GL.glReadPixels(0, 0, *size, layout, kind, image)
+    return np.ascontiguousarray(image[::-1])
+
+
 def _text(log: bytes | str) -> str:
     return (log.decode(errors="replace") if isinstance(log, bytes) else log).strip()
