@@ -256,8 +256,32 @@ with Windows() as windows:
         assert code == 0
         lines = words.splitlines()
         assert len(lines) == 2
-        assert "is lost: window front, which filled it, is now a window of 800 × 600 on screen" in lines[0]
-        assert "is back: window front fills it again" in lines[1]
+        assert lines[0] == "monitor screen is lost: window front is now a window on screen"
+        assert lines[1] == "monitor screen is back, and window front on it"
+
+
+def test_a_window_placed_on_a_lost_monitor_is_brought_back(display):  # noqa: F811
+    code = (
+        HEAD
+        + """
+import logging
+logging.basicConfig(level=logging.WARNING, format="%(message)s")
+with Windows() as windows:
+    far = windows.open("far", WindowPlace(position=(1700, 100), size=(64, 48)))
+    near = windows.open("near", WindowPlace(position=(200, 100), size=(64, 48)))
+    handle = windows.glfw.get_monitors()[0]
+    for change in (windows.glfw.DISCONNECTED, windows.glfw.CONNECTED):
+        windows._monitor_changed(handle, change)
+        windows.poll(0.3)
+        say([far.position, near.position])
+"""
+    )
+    with Program(display, code) as program:
+        assert program.value() == [[0, 0], [200, 100]]
+        assert program.value() == [[1700, 100], [200, 100]]
+        code, words = program.end()
+        assert code == 0
+        assert words.count("window far") == 2 and "near" not in words
 
 
 def test_refusals_are_one_line_with_advice(display):  # noqa: F811

@@ -167,3 +167,14 @@ RIG_CORNERS = 1e-12
 
 # Dubois' matrices have three decimals; six of them sum to a row: 6 · 0.0005 = 0.003.
 NEUTRAL_ANAGLYPH = 3e-3
+
+# A composed pixel is one picture over the background, or six products of them: ten roundings of 6e-8.
+COMPOSED = 6e-7
+# Half precision rounds by 2⁻¹² of a value below 1, a picture's colour and alpha once each; rows of both of
+# Dubois' matrices have absolute sums below 1.5: 1.5 · 2 · 2⁻¹².
+COMPOSED_HALF = 7.4e-4
+# The screen's bytes: values half way between two of them may be rounded either way.
+BYTE = 1
+# A picture on its own wall: interpolated positions are off by 2⁻²² of the picture's width, and a rasteriser's
+# bilinear weights have 8 bits of a texel, times the difference of neighbours.
+ON_ITS_WALL = 1 / 256

@@ -39,12 +39,13 @@ class Monitors:
     Attributes
     ----------
     displaced
-        Windows that filled a monitor that was lost, by its name.
+        By the name of a monitor that was lost: the windows that were on it, with their position on the
+        desktop, or None for one that filled it.
     """
 
     def __init__(self, glfw: ModuleType):
         self._glfw = glfw
-        self.displaced: dict[str, Window] = {}
+        self.displaced: dict[str, list[tuple[Window, tuple[int, int] | None]]] = {}
 
     def all(self) -> list[Monitor]:
         """Those that are connected; the first is the main one."""
@@ -81,49 +82,60 @@ class Monitors:
 
     def below(self, window: Window) -> Monitor | None:
         """The monitor that shows most of a window; None without monitors."""
-        x, y = window.position
-        width, height = self._glfw.get_window_size(window.handle)
+        return max(self.all(), key=lambda monitor: self._shown(window, monitor), default=None)
 
-        def shown(monitor: Monitor) -> int:
-            (left, top), (wide, high) = monitor.position, monitor.size
-            across = min(x + width, left + wide) - max(x, left)
-            down = min(y + height, top + high) - max(y, top)
-            return max(across, 0) * max(down, 0)
+    def lost(self, name: str, windows: Sequence[Window]) -> None:
+        """A monitor is gone: windows that nobody sees any more go to the main one, and a warning says so.
 
-        return max(self.all(), key=shown, default=None)
-
-    def fill(self, handle: Any, window: Window) -> None:
-        """Let a window fill a monitor, at its resolution."""
-        there = self.describe(handle)
-        self._glfw.set_window_monitor(window.handle, handle, 0, 0, *there.size, there.hz)
-        window.fullscreen_on = there.name
-        _log.warning("monitor %s is back: window %s fills it again", there.name, window.name)
-
-    def displace(self, name: str, windows: Sequence[Window]) -> None:
-        """A monitor is lost: the window that filled it becomes one with a frame on the main one, and says so.
-
-        Half as large as the monitor, so that it does not hide another wall there.
+        A window that filled it gets a frame and half the main monitor's edges, so as not to hide all there.
         """
         left = self.all()
         for window in windows:
-            if window.fullscreen_on != name:
+            filled = window.fullscreen_on == name
+            if not filled and (not left or any(self._shown(window, monitor) for monitor in left)):
                 continue
+            self.displaced.setdefault(name, []).append((window, None if filled else window.position))
             window.fullscreen_on = ""
-            self.displaced[name] = window
-            where = "on no monitor"
-            if left:
-                (x, y), (width, height) = left[0].position, left[0].size
+            if not left:
+                _log.warning(
+                    "monitor %s is lost, and with it window %s: there is no other", name, window.name
+                )
+                continue
+            (x, y), (width, height) = left[0].position, left[0].size
+            if filled:
                 place = x + width // 4, y + height // 4, width // 2, height // 2
                 self._glfw.set_window_attrib(window.handle, self._glfw.DECORATED, True)
                 self._glfw.set_window_monitor(window.handle, None, *place, self._glfw.DONT_CARE)
-                where = f"a window of {_text(place[2:])} on {left[0].name}"
+            else:
+                self._glfw.set_window_pos(window.handle, x, y)
             _log.warning(
-                "monitor %s is lost: window %s, which filled it, is now %s", name, window.name, where
+                "monitor %s is lost: window %s is now a window on %s", name, window.name, left[0].name
             )
+
+    def found(self, handle: Any) -> None:
+        """A monitor is there: what was on it before goes back."""
+        there = self.describe(handle)
+        for window, position in self.displaced.pop(there.name, ()):
+            if position is None:
+                self._glfw.set_window_monitor(window.handle, handle, 0, 0, *there.size, there.hz)
+                window.fullscreen_on = there.name
+            else:
+                self._glfw.set_window_pos(window.handle, *position)
+            _log.warning("monitor %s is back, and window %s on it", there.name, window.name)
 
     def forget(self, window: Window) -> None:
         """A window was closed."""
-        self.displaced = {name: other for name, other in self.displaced.items() if other is not window}
+        for name, windows in self.displaced.items():
+            self.displaced[name] = [entry for entry in windows if entry[0] is not window]
+
+    def _shown(self, window: Window, monitor: Monitor) -> int:
+        """How much of a window a monitor shows, square screen coordinates."""
+        x, y = window.position
+        width, height = self._glfw.get_window_size(window.handle)
+        (left, top), (wide, high) = monitor.position, monitor.size
+        across = min(x + width, left + wide) - max(x, left)
+        down = min(y + height, top + high) - max(y, top)
+        return max(across, 0) * max(down, 0)
 
 
 def _text(size: Sequence[int]) -> str:

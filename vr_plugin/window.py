@@ -281,10 +281,10 @@ class Windows:
         name = self.monitors.name(handle)
         connected = change == self.glfw.CONNECTED
         self._events.append(MonitorChange("", name, connected))
-        if not connected:
-            self.monitors.displace(name, self._windows)
-        elif window := self.monitors.displaced.pop(name, None):
-            self.monitors.fill(handle, window)
+        if connected:
+            self.monitors.found(handle)
+        else:
+            self.monitors.lost(name, self._windows)
 
     def _set_intervals(self) -> None:
         """Only the last window that is swapped waits for the display, or n windows would wait n times."""
