@@ -149,6 +149,12 @@ def test_a_reference_is_known_by_all_it_depends_on(small):
     other = volume.data.copy()
     other[3, 4, 5] += 1
     eye = psw.Eye(view.eye.position, near=1.0)
+    parallel = [
+        psw.View.parallel(view.eye.position, centre, (0, 1, 0), height, (24, 20))
+        for centre, height in [(volume.centre, 20.0), (volume.centre, 21.0)]
+    ]
+    step = view.eye.position + parallel[0].wall.lower_right - parallel[0].wall.lower_left
+    aside = psw.View.parallel(step, step - view.eye.position + volume.centre, (0, 1, 0), 20.0, (24, 20))
     variants = [
         small,
         (psw.Volume(other), transfer, view, regions),
@@ -161,6 +167,7 @@ def test_a_reference_is_known_by_all_it_depends_on(small):
         (volume, transfer, cases.eye_path(volume, "front", (24, 21))[0], regions),
         (volume, transfer, view, psw.Regions(crop=(0, 9, 0, 9, 0, 9))),
         (volume, transfer, view, psw.Regions(clip=[(1, 0, 0, -3)])),
+        *((volume, transfer, other, regions) for other in (*parallel, aside)),
     ]
     assert len({truth.key_of(*variant) for variant in variants}) == len(variants)
     assert truth.key_of(*small) == truth.key_of(*small)

@@ -99,6 +99,8 @@ def key_of(volume: Volume, transfer: TransferFunction, view: View, regions: Regi
         *("transfer", transfer.points, transfer.opacity_unit),
         *("view", view.direction_from_pixel.tolist(), view.size),
         *("eye", view.eye.position.tolist(), view.eye.near),
+        # From infinity all pixels have one direction: where the wall stands tells their rays apart.
+        *(("infinity", view.wall.world_from_pixel.tolist()) if view.eye.is_at_infinity else ()),
         *("regions", regions.crop, regions.clip, TOLERANCE),
     ]
     digest.update(repr(parts).encode())
