@@ -58,6 +58,11 @@ def test_resampling_keeps_place_and_what_is_linear():
     assert finer.centre == pytest.approx(volume.centre)
     z, y, x = np.indices((5, 17, 9)) / 2
     assert finer.data == pytest.approx(2 + x - 0.5 * y + 4 * z)
+    other = cases.resampled(volume, (3, 5, 9))
+    assert other.size == (3, 5, 9)
+    assert other.extent == pytest.approx(volume.extent)
+    z, y, x = np.indices((9, 5, 3)) * np.array([1 / 4, 2, 2])[:, None, None, None]
+    assert other.data == pytest.approx(2 + x - 0.5 * y + 4 * z)
 
 
 def test_volumes_are_found_by_the_beginning_of_their_name(tmp_path: Path):

@@ -99,9 +99,14 @@ def data_folder(given: str | Path | None) -> Path | None:
     return folder / "volumes" if (folder / "volumes").is_dir() else folder
 
 
+def find_volume(folder: Path, name: str) -> Path | None:
+    """The volume file in `folder` whose name begins so; None where there is none."""
+    return next((p for p in sorted(folder.glob(f"{name}*")) if p.name.endswith(_SUFFIXES)), None)
+
+
 def default_volumes(folder: Path | None) -> list[str]:
     """The real volumes that are there, and a made-up one."""
-    return [name for name in REAL if folder is not None and _find(folder, name)] + ["ct256"]
+    return [name for name in REAL if folder is not None and find_volume(folder, name)] + ["ct256"]
 
 
 def fixed_cases(
@@ -153,15 +158,24 @@ def volume_named(name: str, folder: Path | None) -> Volume:
     return resampled(volume, int(edge)) if edge else volume
 
 
-def resampled(volume: Volume, edge: int) -> Volume:
-    """The volume on a grid whose longest edge has `edge` voxels, trilinearly; its extent stays.
+def resampled(volume: Volume, size: int | tuple[int, int, int]) -> Volume:
+    """The volume on another grid, trilinearly; its extent stays.
 
     Voxels that are whole numbers are rounded.
+
+    Parameters
+    ----------
+    size
+        Voxels of the longest edge, or along x, y and z, at least 2.
     """
     data = volume.data.astype(np.float32)
-    factor = (edge - 1) / (max(volume.size) - 1)
-    for axis, count in enumerate(data.shape):
-        wanted = max(2, round((count - 1) * factor) + 1)
+    if isinstance(size, int):
+        factor = (size - 1) / (max(volume.size) - 1)
+        name = f"{volume.name}@{size}"
+        size = tuple(max(2, round((count - 1) * factor) + 1) for count in volume.size)
+    else:
+        name = f"{volume.name}@{'×'.join(map(str, size))}"
+    for axis, (count, wanted) in enumerate(zip(data.shape, size[::-1], strict=True)):
         at = np.linspace(0, count - 1, wanted)
         below = np.minimum(at.astype(np.intp), max(count - 2, 0))
         shape = [1, 1, 1]
@@ -174,7 +188,7 @@ def resampled(volume: Volume, edge: int) -> Volume:
     pose = volume.world_from_object.copy()
     old, new = np.array(volume.size), np.array(data.shape[::-1])
     pose[:3, :3] *= (old - 1) / np.maximum(new - 1, 1)
-    return Volume(data.astype(volume.data.dtype), world_from_object=pose, name=f"{volume.name}@{edge}")
+    return Volume(data.astype(volume.data.dtype), world_from_object=pose, name=name)
 
 
 def transfer_for(name: str, function: str, volume: Volume) -> TransferFunction:
@@ -237,7 +251,7 @@ def _check_name(name: str, folder: Path | None) -> None:
 
 
 def _path(base: str, folder: Path | None) -> Path:
-    found = Path(base) if Path(base).exists() else _find(folder, base) if folder else None
+    found = Path(base) if Path(base).exists() else find_volume(folder, base) if folder else None
     if found is None:
         where = f"in {folder} " if folder else ""
         raise FileError(
@@ -245,7 +259,3 @@ def _path(base: str, folder: Path | None) -> Path:
             f"with --data or {DATA_VARIABLE}, or use a made-up volume such as ct128"
         )
     return found
-
-
-def _find(folder: Path, name: str) -> Path | None:
-    return next((p for p in sorted(folder.glob(f"{name}*")) if p.name.endswith(_SUFFIXES)), None)

@@ -6,22 +6,22 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from time import perf_counter
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
-from ..geometry.view import View
-
 ROUNDS = 5  # each contestant has so many turns, and at least a frame in each
+Place = TypeVar("Place")  # on the path: a View, or whatever the contestants understand
+Taken = TypeVar("Taken", contravariant=True)
 
 
-class Contestant(Protocol):
+class Contestant(Protocol[Taken]):
     """Whoever can be timed."""
 
-    def prepare(self, view: View) -> None:
+    def prepare(self, view: Taken) -> None:
         """Called before each turn; not timed."""
 
-    def draw(self, view: View) -> dict[str, float]:
+    def draw(self, view: Taken) -> dict[str, float]:
         """Draw one frame; `ms`, its wall time, and other milliseconds by name."""
 
 
@@ -47,8 +47,8 @@ class Times:
 
 
 def time_in_turn(
-    contestants: Sequence[Contestant],
-    views: Sequence[View],
+    contestants: Sequence[Contestant[Place]],
+    views: Sequence[Place],
     seconds: float,
     rounds: int = ROUNDS,
     after_turn: Callable[[], None] = lambda: None,
