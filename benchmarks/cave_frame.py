@@ -2,9 +2,8 @@
 
     python benchmarks/cave_frame.py [--volume N] [--size 1024] [--threads 2]
 
-The room is 3 m wide with walls in front, left, right and a floor; its centre is 1.5 m above the floor. The
-viewer's eyes, 6.5 cm apart, are 1.7 m above the floor and 1.0 m behind the centre; a synthetic CT, 1 m wide,
-stands with its centre 0.3 m before the room's. Eyes move along a short path, so that every frame is new.
+Room, viewer and placement are those of `persp_sw.measure.cave`; the volume is a synthetic CT. Eyes move
+along a short path, so that every frame is new.
 """
 
 from __future__ import annotations
@@ -14,10 +13,10 @@ from time import perf_counter
 
 import numpy as np
 
-from persp_sw import Canvas, Eye, Renderer, Settings, TransferFunction, View, Volume, Wall
+from persp_sw import Canvas, Renderer, Settings, TransferFunction, View
+from persp_sw.measure.cave import eye_pair, four_walls, placed
 from persp_sw.volume.phantoms import synthetic_ct
 
-CENTRE, HALF, HEIGHT = np.array([0.0, 1.5, -0.3]), 1.5, 3.0
 FUNCTIONS = {  # opacities a voxel
     "surface": [(0, (0, 0, 0), 0), (100, (0.9, 0.7, 0.5), 0), (125, (0.9, 0.7, 0.5), 1), (255, (1, 1, 1), 1)],
     "ramp": [(0, (0.2, 0.3, 0.8), 0), (128, (0.9, 0.6, 0.3), 0.5), (255, (1, 1, 1), 1)],
@@ -39,18 +38,6 @@ CASES = [
 ]
 
 
-def room(size: int) -> list[Wall]:
-    """Front, left, right and floor, as corners lower left, lower right, upper left."""
-    a, h = HALF, HEIGHT
-    corners = [
-        ((-a, 0, -a), (a, 0, -a), (-a, h, -a)),
-        ((-a, 0, a), (-a, 0, -a), (-a, h, a)),
-        ((a, 0, -a), (a, 0, a), (a, h, -a)),
-        ((-a, 0, a), (a, 0, a), (-a, 0, -a)),
-    ]
-    return [Wall(*map(np.array, wall), (size, size)) for wall in corners]
-
-
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -61,24 +48,19 @@ def main():
     parser.add_argument("--frames", type=int, default=40)
     options = parser.parse_args()
     n = options.volume
-    spacing = 1.0 / (n - 1)
-    pose = np.diag([spacing, spacing, spacing, 1.0])
-    pose[:3, 3] = CENTRE - 0.5
-    volume = Volume(synthetic_ct(n).data, world_from_object=pose)
-    walls = room(options.size)
+    volume = placed(synthetic_ct(n))
+    walls = four_walls(options.size)
     out = [[Canvas(options.size, options.size) for _ in walls] for _ in range(2)]
     print(f"{'function':8} quality samples   ms   composite  warp   frames/s  front covered  faces")
     for name, quality, samples in CASES:
-        transfer = TransferFunction(FUNCTIONS[name], spacing)
+        transfer = TransferFunction(FUNCTIONS[name], 1 / (n - 1))
         settings = Settings(quality=quality, samples_per_interval=samples, threads=options.threads)
         renderer = Renderer(volume, transfer, settings)
         times = []
         for frame in range(-2, options.frames):
-            head = np.array([0.002 * frame, 1.7 + 0.001 * frame, 1.0])
             start = perf_counter()
             composite = 0.0
-            for side in (0, 1):
-                eye = Eye(head + ((side - 0.5) * 0.065, 0, 0))
+            for side, eye in enumerate(eye_pair(frame)):
                 began = perf_counter()
                 image = renderer.composite(eye, walls)
                 composite += perf_counter() - began
