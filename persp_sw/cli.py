@@ -35,6 +35,10 @@ _OWN = {
         "Measure time, work, memory and error, beside other renderers.",
     ),
     "chart": ("persp_sw.commands.chart:chart", "Draw time against accuracy, for all ways to sample."),
+    "papers": (
+        "persp_sw.commands.papers:papers",
+        "Repeat a paper's own experiments, beside what it prints.",
+    ),
     "warmup": ("persp_sw.commands.warmup:warmup", "Compile what a first picture would wait for."),
 }
 _GROUP = "persp_sw.commands"

@@ -1,4 +1,4 @@
-"""What was measured on: processor, cores, versions."""
+"""What was measured on: processor, cores, what else ran, versions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .. import __version__
 
 
 def describe_machine() -> dict[str, Any]:
-    """For reports; names no host."""
+    """For reports; names no host. `load`: processes that ran or waited in the last minute; None if untold."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     versions = {"persp_sw": __version__, "python": platform.python_version()}
     for package in ("numpy", "numba", "llvmlite", "vtk"):
@@ -20,7 +20,13 @@ def describe_machine() -> dict[str, Any]:
             versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return {"processor": _processor(), "cores": cores, "system": platform.system(), "versions": versions}
+    return {
+        "processor": _processor(),
+        "cores": cores,
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
+        "system": platform.system(),
+        "versions": versions,
+    }
 
 
 def _processor() -> str:
