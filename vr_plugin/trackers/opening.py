@@ -22,6 +22,7 @@ def open_tracker(
     rest_pose: Pose | None = None,
     end: str = "loop",
     folder: str | Path = ".",
+    start: float | None = None,
 ) -> Tracker:
     """A tracker whose samples lie in the room.
 
@@ -35,6 +36,8 @@ def open_tracker(
         What a recorded path does at its end: "loop" or "hold".
     folder
         What a recorded path's name is relative to: the rig file's folder.
+    start
+        When a recorded path begins, on the polls' clock; None: at the first poll.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def open_tracker(
         address, port = dtrack_address(place.address)
         source = DTrack(port, address)
     elif place.kind == "path":
-        source = PathTracker(Recording.load(Path(folder) / place.address), end, place.head)
+        source = PathTracker(Recording.load(Path(folder) / place.address), end, place.head, start)
     else:
         raise TrackerError(f"no tracker is of kind {place.kind!r}")
     try:
