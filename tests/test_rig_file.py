@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 
 import numpy as np
@@ -11,7 +12,13 @@ from views import random_rotation
 
 from vr_plugin.pose import Pose, quaternion_of
 from vr_plugin.rig import Eyes, Placement, QualityAim, Rig, RigError, RigWall, TrackerPlace, WindowPlace
+from vr_plugin.rig_check import findings
 from vr_plugin.rig_file import load_rig, rig_of_keys, rig_to_toml
+
+try:
+    from tomllib import loads as _toml
+except ImportError:  # Python 3.10
+    from tomli import loads as _toml
 
 WHOLE = """
 name = "lab"
@@ -285,3 +292,47 @@ def test_what_is_doubtful_is_said_and_shown_all_the_same(rig_file, caplog):
     with caplog.at_level(logging.WARNING, "persp_sw"):
         load_rig(rig_file(swapped))
     assert "wall 'front' turns its back" in caplog.text and "mirrored" in caplog.text
+
+
+JUNK = (
+    [None, True, -1, 0, 1e308, 1e-308, float("nan"), float("inf"), 10**30, "", "x", "\x00"]
+    + [0.5, 0.02, 2, 3, -1.5, 1e-6, 1e6, "mouse", "quad"]  # which may do
+    + [[], [[]], {}, {"x": {}}, [None, {}], [1, 2, 3], [0, 0, 0], [1e308, -1e308, 1e-308], [1e-308, 0, 0]]
+    + [[1e9, -1e9, 1e9], [[0] * 4 for _ in range(4)], [[1, 2, 3, 4] for _ in range(4)]]
+)
+
+
+def test_whatever_a_file_holds_the_answer_is_a_rig_or_problems(rng):
+    """2000 files with one to three values replaced by junk, or keys renamed; no other error."""
+    good = _toml(WHOLE)
+    outcomes = {"rig": 0, "problems": 0}
+    for _ in range(2000):
+        keys = copy.deepcopy(good)
+        for _ in range(rng.integers(1, 4)):
+            spoil(keys, rng)
+        try:
+            rig = rig_of_keys(keys)
+            findings(rig)
+            rig_to_toml(rig)
+            outcomes["rig"] += 1
+        except RigError as error:
+            assert str(error).count("\n  - ") >= 1
+            outcomes["problems"] += 1
+    assert min(outcomes.values()) > 20, outcomes
+
+
+def spoil(node, rng) -> None:
+    """Replace a value somewhere below by junk, or give its key another name."""
+    while True:
+        places = list(node) if isinstance(node, dict) else list(range(len(node)))
+        if not places:
+            return
+        place = places[rng.integers(len(places))]
+        if isinstance(node[place], dict | list) and node[place] and rng.random() < 0.7:
+            node = node[place]
+            continue
+        if isinstance(node, dict) and rng.random() < 0.2:
+            node[place + "s"] = node.pop(place)
+        else:
+            node[place] = copy.deepcopy(JUNK[rng.integers(len(JUNK))])
+        return

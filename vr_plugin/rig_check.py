@@ -37,7 +37,7 @@ class WallMeasures:
     degrees
         Opening angle between its left and right edge's middle, seen from the eye at rest.
     pixels_a_degree
-        At the wall's middle, along its width.
+        At the wall's middle, along its width; 0 where that is seen edge-on.
     """
 
     size: tuple[float, float]
@@ -61,17 +61,16 @@ class WallMeasures:
         in_plane = abs(distance) <= 1e-9 * max(width, height)
         pixel = width / w.pixels[0], height / w.pixels[1]
         centre = w.lower_left + (across + up) / 2 - eye
-        along = across / width
-        sight = np.linalg.norm(centre)
-        turned = np.linalg.norm(along - centre * (along @ centre) / max(sight, 1e-150) ** 2)
-        one = np.degrees(pixel[0] * turned / max(sight, 1e-300))
+        sight = float(np.linalg.norm(centre))
+        # The part of a pixel's width that lies across the line of sight; none with the eye in the middle.
+        broad = np.linalg.norm(np.cross(across / width, centre)) * pixel[0] / sight if sight else 0.0
         return cls(
             (width, height),
             pixel,
             _angle(across, up),
             None if in_plane else before_wall(eye, corners),
             _angle(left, right),
-            1 / max(one, 1e-300),
+            float(np.radians(sight / broad)) if broad > 1e-12 * sight else 0.0,
         )
 
 

@@ -16,8 +16,9 @@ import persp_sw as psw
 from .problems import sentences
 from .rig import Eyes, Placement, QualityAim, Rig, RigError, RigWall, TrackerPlace, WindowPlace
 from .rig_check import findings, flaws_of
-from .rig_schema import UNION_TAGS, RigKeys, WallKeys, matrix_of
+from .rig_schema import RigKeys, WallKeys
 from .rig_text import rig_to_toml
+from .schema_types import UNION_TAGS, matrix_of
 
 __all__ = ["load_rig", "rig_of_keys", "rig_to_toml"]
 

@@ -5,92 +5,34 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Discriminator,
-    Field,
-    StringConstraints,
-    Tag,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, field_validator, model_validator
 
 from .pose import Pose, quaternion_of
 from .rig import FIXED_TO, STEREO_MODES, TRACKER_KINDS, Eyes, TrackerPlace
-from .similarity import AXES, flaw_of, similarity
+from .schema_types import (
+    POINT,
+    Count,
+    Flag,
+    Number,
+    Pixels,
+    Positive,
+    RigidKeys,
+    Row,
+    Similarity,
+    SimilarityKeys,
+    Table,
+    Text,
+    Vector3,
+    Whole,
+    checked_quaternion,
+    checked_similarity,
+    matrix_of,
+)
 
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
-Count = Annotated[int, Field(strict=True, ge=0)]
-Whole = Annotated[int, Field(strict=True)]
-Pixels = Annotated[int, Field(strict=True, ge=1, le=16384)]
-Flag = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, StringConstraints(min_length=1)]
-Vector3 = tuple[Number, Number, Number]
-Axis = Literal[AXES]
-Row = tuple[Number, Number, Number, Number]
-
-UNION_TAGS = ("table", "rows")
-_POINT = "[x, y, z] in metres"
 _SIMILARITY = "four rows of four numbers, or {{ position, axes, turn, scale }}, {}"
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid")
-
-
-class SimilarityKeys(_Table):
-    """Shift, names of axes, turn and scale; see `similarity.similarity`."""
-
-    position: Vector3 = Field((0.0, 0.0, 0.0), description="[x, y, z] of the source's origin, in metres")
-    axes: tuple[Axis, Axis, Axis] = Field(("x", "y", "z"), description='three axes such as ["x", "z", "-y"]')
-    turn: Number = Field(0.0, description="degrees about the vertical, seen from above to the left")
-    scale: Positive = Field(1.0, description="metres in a unit, such as 0.001 for mm")
-
-    @model_validator(mode="after")
-    def _makes_one(self) -> SimilarityKeys:
-        _checked(self.matrix)
-        return self
-
-    @property
-    def matrix(self) -> np.ndarray:
-        """(4, 4)."""
-        return similarity(self.position, self.axes, self.turn, self.scale)
-
-
-Rows = tuple[Row, Row, Row, Row]
-Similarity = Annotated[
-    Annotated[SimilarityKeys, Tag("table")] | Annotated[Rows, Tag("rows")],
-    Discriminator(lambda value: "table" if isinstance(value, dict | SimilarityKeys) else "rows"),
-]
-
-
-class RigidKeys(_Table):
-    """A turn and a shift without a scale."""
-
-    position: Vector3 = Field((0.0, 0.0, 0.0), description=_POINT)
-    axes: tuple[Axis, Axis, Axis] = Field(("x", "y", "z"), description='three axes such as ["x", "z", "-y"]')
-    turn: Number = Field(0.0, description="degrees about the sensor's y axis")
-    orientation: Row | None = Field(None, description="a quaternion [x, y, z, w]")
-
-    @model_validator(mode="after")
-    def _makes_one(self) -> RigidKeys:
-        if self.orientation is not None and {"axes", "turn"} & self.model_fields_set:
-            raise ValueError("give orientation, or axes and turn, not both")
-        _checked(similarity(axes=self.axes))
-        _turn_of(self.orientation)
-        return self
-
-    @property
-    def pose(self) -> Pose:
-        """The motion."""
-        if self.orientation is not None:
-            return Pose(self.position, self.orientation)
-        return Pose.from_matrix(similarity(self.position, self.axes, self.turn))
-
-
-class WindowKeys(_Table):
+class WindowKeys(Table):
     """Where a wall's window goes."""
 
     monitor: Count | None = Field(None, description="a number from 0")
@@ -108,13 +50,13 @@ class WindowKeys(_Table):
         return self
 
 
-class WallKeys(_Table):
+class WallKeys(Table):
     """One flat display."""
 
     name: Text = Field(description="a name of its own")
-    lower_left: Vector3 = Field(description=_POINT)
-    lower_right: Vector3 = Field(description=_POINT)
-    upper_left: Vector3 = Field(description=_POINT)
+    lower_left: Vector3 = Field(description=POINT)
+    lower_right: Vector3 = Field(description=POINT)
+    upper_left: Vector3 = Field(description=POINT)
     pixels: tuple[Pixels, Pixels] = Field(description="[width, height] of one eye's picture, 1 … 16384")
     stereo: Literal[STEREO_MODES] = Field("mono", description="a stereo mode")
     fixed_to: Literal[FIXED_TO] = Field("room", description='"room" or "head"')
@@ -124,10 +66,10 @@ class WallKeys(_Table):
     )
 
 
-class RestPoseKeys(_Table):
+class RestPoseKeys(Table):
     """Where the head is when nothing tracks it, and how it is turned."""
 
-    position: Vector3 = Field((0.0, 1.7, 0.0), description=_POINT)
+    position: Vector3 = Field((0.0, 1.7, 0.0), description=POINT)
     orientation: Row | None = Field(None, description="a quaternion [x, y, z, w]")
     look: Vector3 | None = Field(None, description="[x, y, z], the direction it looks in")
     up: Vector3 = Field((0.0, 1.0, 0.0), description="[x, y, z], what is up for it")
@@ -136,7 +78,7 @@ class RestPoseKeys(_Table):
     def _one_turn(self) -> RestPoseKeys:
         if self.orientation is not None and {"look", "up"} & self.model_fields_set:
             raise ValueError("give orientation, or look and up, not both")
-        _turn_of(self.orientation)
+        checked_quaternion(self.orientation)
         if np.linalg.norm(np.cross(self._look, self.up)) < 1e-6 * np.linalg.norm(self.up) + 1e-300:
             raise ValueError(
                 f"look {list(self._look)} and up {list(self.up)} are parallel; choose another up"
@@ -163,11 +105,11 @@ class RestPoseKeys(_Table):
         )
 
 
-class EyesKeys(_Table):
+class EyesKeys(Table):
     """Where eyes are on a tracked head."""
 
     separation: Number = Field(Eyes.separation, description="metres, about 0.064")
-    offset: Vector3 = Field((0.0, 0.0, 0.0), description=_POINT)
+    offset: Vector3 = Field((0.0, 0.0, 0.0), description=POINT)
     rest_pose: RestPoseKeys = Field(
         default_factory=RestPoseKeys, description="{ position, look } or { position, orientation }"
     )
@@ -181,7 +123,7 @@ class EyesKeys(_Table):
         return value
 
 
-class RecordingKeys(_Table):
+class RecordingKeys(Table):
     """How a recorded head path is placed in the room."""
 
     address: Text = Field(description="the recording's file name")
@@ -206,7 +148,7 @@ class RecordingKeys(_Table):
     @field_validator("room_from_tracker")
     @classmethod
     def _similarity(cls, value: Any) -> Any:
-        _checked(matrix_of(value))
+        checked_similarity(matrix_of(value))
         return value
 
 
@@ -234,11 +176,11 @@ class TrackerKeys(RecordingKeys):
         return self
 
 
-class WorldKeys(_Table):
+class WorldKeys(Table):
     """Where and how large the volume stands in the room."""
 
     room_from_world: Similarity | None = Field(None, description=_SIMILARITY.format("world to room"))
-    centre: Vector3 | None = Field(None, description=_POINT)
+    centre: Vector3 | None = Field(None, description=POINT)
     size: Positive = Field(1.0, description="metres, of the volume's longest edge")
 
     @model_validator(mode="after")
@@ -249,11 +191,11 @@ class WorldKeys(_Table):
                 raise ValueError(
                     f"room_from_world says it all, so {' and '.join(sorted(both))} cannot hold; remove one"
                 )
-            _checked(matrix_of(self.room_from_world))
+            checked_similarity(matrix_of(self.room_from_world))
         return self
 
 
-class QualityKeys(_Table):
+class QualityKeys(Table):
     """What the pictures should be like."""
 
     target_hz: Annotated[Number, Field(ge=1, le=1000)] = Field(60.0, description="frames a second")
@@ -272,7 +214,7 @@ class QualityKeys(_Table):
         return self
 
 
-class RigKeys(_Table):
+class RigKeys(Table):
     """All keys a rig file may have."""
 
     name: str = Field("", description="text")
@@ -282,19 +224,3 @@ class RigKeys(_Table):
     recording: list[RecordingKeys] = Field([], description="[[recording]] tables")
     world: WorldKeys = Field(default_factory=WorldKeys, description="the table [world]")
     quality: QualityKeys = Field(default_factory=QualityKeys, description="the table [quality]")
-
-
-def matrix_of(given: SimilarityKeys | Rows) -> np.ndarray:
-    """(4, 4) of a checked similarity, however it was written."""
-    return given.matrix if isinstance(given, SimilarityKeys) else np.array(given, np.float64)
-
-
-def _checked(matrix: np.ndarray) -> None:
-    flaw = flaw_of(matrix)
-    if flaw:
-        raise ValueError(flaw)
-
-
-def _turn_of(quaternion: Row | None) -> None:
-    if quaternion is not None and not np.linalg.norm(quaternion) > 1e-9:
-        raise ValueError("a quaternion [x, y, z, w] is not all zeros; [0, 0, 0, 1] turns nothing")
