@@ -95,9 +95,11 @@ def test_every_wall_of_a_config_shows_what_the_reference_shows(name):
 def test_a_head_mounted_pair_goes_with_the_head():
     """Wherever the head is, the middle of the screens is half a metre before the nose."""
     rig = config("hmd")
-    maker = FrameMaker(None, rig.walls, np.eye(4))
+    maker = FrameMaker(psw.Renderer(cushion(8)), small(rig).walls, np.eye(4))
     head = Pose((1, 2, 3), (0, np.sqrt(0.5), 0, np.sqrt(0.5)))  # looks along −x
-    walls = [maker.wall_in_world(wall, head) for wall in rig.walls]
+    frame = maker.make(head, eyes_of_head(head, rig.eyes))
+    assert [picture.eye for picture in frame.pictures] == ["left", "right"]
+    walls = [picture.view.wall for picture in frame.pictures]
     centres = [(wall.lower_right + wall.upper_left) / 2 for wall in walls]
     np.testing.assert_allclose(np.mean(centres, 0), (0.5, 2, 3), atol=1e-12)
     assert centres[0][2] > centres[1][2]  # its left is at larger z

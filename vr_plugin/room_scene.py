@@ -13,9 +13,9 @@ import persp_sw as psw
 
 from .drawing import Colour
 from .eyes import EyePair, eyes_of_head
-from .frame import EYES_OF
 from .placement import corners_in_room, room_from_world
 from .rig import Rig
+from .stereo import eyes_of
 
 # Colours that most colour-blind people tell apart (Okabe and Ito), without the two that eyes have.
 WALL_COLOURS = ((0, 114, 178), (0, 158, 115), (204, 121, 167), (230, 159, 0), (86, 180, 233), (140, 110, 60))
@@ -93,7 +93,7 @@ class RoomScene:
             groups.setdefault((np.round(corners, 4) + 0.0).tobytes(), []).append(number)
         walls = []
         for count, numbers in enumerate(groups.values()):
-            shown = dict.fromkeys(EYES_OF.get(rig.walls[n].stereo, ("middle",))[0] for n in numbers)
+            shown = dict.fromkeys(_shown_eye(rig.walls[n].stereo) for n in numbers)
             walls.append(
                 ShownWall(
                     [rig.walls[n].name for n in numbers],
@@ -187,6 +187,12 @@ class RoomScene:
                 colour = PATH_OUTSIDE
             pieces.append((self.heads[start : end + 1], colour))
         return pieces
+
+
+def _shown_eye(mode: str) -> str:
+    """The eye whose frustum is drawn: of two, what lies between them."""
+    names = eyes_of(mode)
+    return names[0] if len(names) == 1 else "middle"
 
 
 def between_walls(points: np.ndarray, rig: Rig) -> np.ndarray:
