@@ -118,7 +118,7 @@ class TrackerPlace:
         How the head lies in the axes of the body that is tracked: a body of markers has whatever axes it got
         when it was taught in. Metres.
     latency
-        Seconds from a sample's time stamp to its arrival that prediction adds on top of the display's.
+        Seconds from a measurement to its time stamp, which are taken off the stamp.
     """
 
     kind: str = "none"
