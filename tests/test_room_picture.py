@@ -7,9 +7,11 @@ import pytest
 from rigs import CONFIGS, rig_of, wall_keys
 
 import persp_sw as psw
+from vr_plugin import drawing
 from vr_plugin.drawing import Sheet
 from vr_plugin.placement import room_from_world
 from vr_plugin.rig_file import load_rig
+from vr_plugin.room_facts import WARNING
 from vr_plugin.room_picture import SIZE, draw_room
 from vr_plugin.room_plan import _Plan
 from vr_plugin.room_scene import EDGES, RoomScene, between_walls
@@ -123,3 +125,27 @@ def test_the_caller_may_give_no_more_than_a_wall():
 def test_the_room_of_the_scene_is_the_rigs(block):
     rig = load_rig(CONFIGS / "cave4.toml")
     assert np.array_equal(scene_of("cave4", block).room_from_world, room_from_world(rig, block))
+
+
+def test_what_is_doubtful_is_in_the_picture_and_many_walls_fit():
+    """Words in warning colour, only where there is something to say; twelve walls of long names."""
+
+    def warned(rig) -> int:
+        shades = np.asarray(draw_room(rig)).astype(int)
+        return int((np.abs(shades - WARNING).max(-1) < 25).sum())
+
+    names = [f"wall of tile number {n}" for n in range(12)]
+    walls = [wall_keys(name, machine=f"viscluster{n}") for n, name in enumerate(names)]
+    assert warned(rig_of(*walls)) == 0
+    assert warned(rig_of(*walls[:3], wall_keys("flat", pixels=[64, 20]))) > 200
+
+
+def test_words_without_a_font_of_the_system(monkeypatch):
+    """Pillow's own font has no × or …; its replacements are there."""
+    monkeypatch.setattr(drawing, "_font_file", lambda: None)
+    drawing._font.cache_clear()
+    try:
+        assert drawing._spoken("3 × 4 …") == "3 x 4 ..."
+        assert draw_room(rig_of()).size == SIZE
+    finally:
+        drawing._font.cache_clear()

@@ -13,7 +13,7 @@ from .room_scene import INK, LEFT_EYE, PALE, RIGHT_EYE, RoomScene
 _ROWS = 9  # walls that are listed
 _LINE = 24
 _COLUMNS = (20, 158, 274, 394, 488)
-_WARNING = (190, 60, 0)
+WARNING = (190, 60, 0)
 
 Area = tuple[int, int, int, int]
 
@@ -93,5 +93,5 @@ def _sentences(scene: RoomScene) -> list[tuple[str, str, tuple[int, int, int]]]:
                 INK,
             )
         )
-    rows += [("doubtful", finding, _WARNING) for finding in findings(rig)]
+    rows += [("doubtful", finding, WARNING) for finding in findings(rig)]
     return rows
