@@ -226,9 +226,8 @@ def _print(values: dict[str, Any]) -> None:
     )
     rows["compositings"] = f"{values['compositings_per_frame']} a frame"
     if "separate_ms" in values:
-        rows["separately"] = (
-            f"{values['separate_ms']:.1f} ms, each picture by itself: {values['separate_ratio']:.1f} × as long"
-        )
+        ms, ratio = values["separate_ms"], values["separate_ratio"]
+        rows["separately"] = f"{ms:.1f} ms, each picture by itself: {ratio:.1f} × as long"
     if values.get("outside_frames"):
         rows["outside"] = f"an eye was outside the walls in {values['outside_frames']} frames"
     for picture in values.get("pictures", []):
