@@ -369,9 +369,14 @@ with Windows() as windows:
     target = flat((0.5, 0, 0), (64, 48))
     Composer().compose(target, target, "mono", window.size)
     say(read_screen((1, 1))[0, 0].tolist())
+    import numpy as np
+    from vr_plugin.shapes import Shapes
+    Shapes().polygon(np.eye(4), [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], (1, 1, 0), hidden=False)
+    say(read_screen((1, 1))[0, 0].tolist())
 """
     )
     with Program(display, code, PYOPENGL_PLATFORM=platform) as program:
         program.value()
         assert program.value() == bytes_of(0.5, 0, 0)
+        assert program.value() == [255, 255, 0]
         assert program.end() == (0, "")
