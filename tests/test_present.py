@@ -387,6 +387,14 @@ def test_nothing_to_draw_is_no_error():
     shown = drawn((4, 4), lambda shapes: shapes.lines(np.eye(4), np.empty((0, 2, 3)), (1, 1, 1)))
     assert shown.max() == 0
 
+    def into_nothing(shapes):  # as of an iconified window
+        from OpenGL import GL
+
+        GL.glViewport(0, 0, 0, 0)
+        shapes.lines(np.eye(4), [[(-1, 0, 0), (1, 0, 0)]], (1, 1, 1))
+
+    assert drawn((4, 4), into_nothing).max() == 0
+
 
 # --- text --------------------------------------------------------------------------------------------------
 

@@ -23,6 +23,7 @@ from vr_plugin.stereo import (
     modes_of_windows,
     rectangles,
     shows_left,
+    window_size,
     without_quad_buffers,
 )
 
@@ -124,6 +125,7 @@ def test_pictures_lie_in_the_window(mode, size):
             assert (place.width, place.height) == (width, height)
             assert place.x >= 0 and place.y >= 0
             assert place.x + width <= size[0] and place.y + height <= size[1]
+    assert eye_size(mode, window_size(mode, (width, height))) == (width, height)
     shares = {"side_by_side": (2, 1), "top_bottom": (1, 2)}.get(mode, (1, 1))
     assert (width, height) == tuple(max(n // share, 1) for n, share in zip(size, shares, strict=True))
 

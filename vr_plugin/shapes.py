@@ -107,6 +107,8 @@ class Shapes:
         """
         segments = np.asarray(segments, np.float64).reshape(-1, 2, 3)
         viewport = integers(GL.GL_VIEWPORT, 4)
+        if min(viewport[2:]) < 1:
+            return
         vertices = _ribbons(np.asarray(clip_from_space), segments, viewport[2:], width / 2)
         self._draw(GL.GL_TRIANGLES, vertices, _LINE, colour, half_width=width / 2, hidden=hidden)
 

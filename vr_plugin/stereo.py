@@ -93,6 +93,13 @@ def eye_size(mode: str, size: Sequence[int]) -> tuple[int, int]:
     return place.width, place.height
 
 
+def window_size(mode: str, eye_pixels: Sequence[int]) -> tuple[int, int]:
+    """The smallest window that shows eyes' pictures of (width, height) pixels as they are."""
+    _check(mode)
+    width, height = eye_pixels
+    return width * (1 + (mode == "side_by_side")), height * (1 + (mode == "top_bottom"))
+
+
 def shows_left(row: ArrayLike, first_row: int = 0) -> NDArray[np.bool_]:
     """Whether a row-interleaved display shows the left eye in this row of a window.
 
@@ -144,8 +151,7 @@ def combine(
     if mode in ("quad", "two_windows"):
         raise StereoError(f"{MODES[mode]} has a picture for each eye: there is nothing to combine")
     if size is None:
-        height, width = left.shape[:2]
-        size = width * (1 + (mode == "side_by_side")), height * (1 + (mode == "top_bottom"))
+        size = window_size(mode, left.shape[1::-1])
     needed = eye_size(mode, size)
     places = rectangles(mode, size)
     for name, picture, place in (("left", left, places[0]), ("right", right, places[1])):
