@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from virtual_screen import SCREEN, Program, display  # noqa: F401  (a fixture)
 
 import persp_sw as psw
+from vr_plugin.monitors import Monitors
 from vr_plugin.stereo import shows_left
+from vr_plugin.window import Window
 
 pytestmark = pytest.mark.gl
 
@@ -311,6 +315,27 @@ except WindowError as error:
         assert context.startswith("no window for 'c': ") and "OpenGL 3.3" in context
         assert "--offscreen" in context and "\n" not in context
         assert program.end() == (0, "")
+
+
+def test_screens_with_several_pixels_a_coordinate():
+    """None is here: what glfw says of one with two a coordinate, on the lower of two monitors."""
+    glfw = SimpleNamespace(
+        get_framebuffer_size=lambda _: (800, 600),
+        get_window_size=lambda _: (400, 300),
+        get_window_pos=lambda _: (10, 1221),
+        get_monitors=lambda: ["upper", "lower"],
+        get_monitor_name=lambda handle: handle,
+        get_monitor_pos=lambda handle: (0, 0 if handle == "upper" else 1200),
+        get_video_mode=lambda _: SimpleNamespace(size=(1920, 1200), refresh_rate=60),
+    )
+    window = Window(SimpleNamespace(glfw=glfw, monitors=Monitors(glfw)), "wall", object())
+    assert window.size == (800, 600)
+    assert window.pixel(12.5, 30) == (25, 60)
+    assert window.first_row == 42  # (1221 − 1200) · 2
+    glfw.get_framebuffer_size = lambda _: (0, 0)  # iconified
+    window.measure()
+    assert not window.is_drawn
+    assert window.pixel(12.5, 30) == (25, 60)
 
 
 @pytest.mark.parametrize("screen", [None, ":987"])

@@ -143,10 +143,12 @@ class Composer:
                 self._use("", encode, background)
                 # Which buffers are drawn into belongs to the framebuffer, not to what kept_state keeps.
                 before = integer(GL.GL_DRAW_BUFFER)
-                for buffer, picture in zip(self._quad_buffers, (left, right), strict=True):
-                    GL.glDrawBuffer(buffer)
-                    self._draw(picture, Rectangle(0, 0, *size), size)
-                GL.glDrawBuffer(before)
+                try:
+                    for buffer, picture in zip(self._quad_buffers, (left, right), strict=True):
+                        GL.glDrawBuffer(buffer)
+                        self._draw(picture, Rectangle(0, 0, *size), size)
+                finally:
+                    GL.glDrawBuffer(before)
             else:
                 if mode in ("side_by_side", "top_bottom") and (size[0] % 2 or size[1] % 2):
                     GL.glClearColor(*(psw.images.srgb(background) if encode else background), 1)

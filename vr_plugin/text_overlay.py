@@ -22,7 +22,7 @@ FONTS = (
     "consola.ttf",
 )
 INK = (0.9, 0.93, 0.9)
-PANEL = (0.0, 0.0, 0.0, 0.65)
+PANEL = (0.0, 0.0, 0.0, 0.85)  # of light: a bright picture behind it still shows as a dark grey
 
 
 def text_panel(text: str, letter: int = 16) -> NDArray[np.float32]:
