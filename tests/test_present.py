@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from gl_context import framebuffer, gl, read_floats  # noqa: F401  (a fixture)
+from own_context import framebuffer, gl, read_floats  # noqa: F401  (a fixture)
 from tolerances import BYTE, COMPOSED, COMPOSED_HALF, ON_ITS_WALL
 
 import persp_sw as psw
