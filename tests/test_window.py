@@ -16,7 +16,7 @@ from vr_plugin.window import Window
 pytestmark = pytest.mark.gl
 
 HEAD = """
-from window_program import flat, run, say, tell
+from window_program import flat, run, say, settle, tell
 from vr_plugin.monitors import WindowError
 from vr_plugin.rig import WindowPlace
 from vr_plugin.window import Windows
@@ -189,6 +189,27 @@ with Windows() as windows:
         assert program.end() == (0, "")
 
 
+def test_there_is_one_set_of_windows_at_a_time(display):  # noqa: F811
+    code = (
+        HEAD
+        + """
+with Windows() as windows:
+    windows.open("a", pixels=(32, 32))
+    try:
+        Windows()
+    except WindowError as error:
+        say(str(error))
+    windows.close()
+with Windows() as windows:
+    say(windows.open("a", pixels=(40, 30)).size)
+"""
+    )
+    with Program(display, code) as program:
+        assert "open already" in program.value()
+        assert program.value() == [40, 30]
+        assert program.end() == (0, "")
+
+
 def test_windows_are_swapped_together_and_wait_once(display):  # noqa: F811
     code = (
         HEAD
@@ -233,15 +254,17 @@ logging.basicConfig(level=logging.WARNING, format="%(message)s")
 with Windows() as windows:
     window = windows.open("front", WindowPlace(monitor=0, fullscreen=True), pixels=(10, 10))
     monitor = windows.monitors.all()[0]
+    settle(windows, lambda: window.size == monitor.size)
     say([window.size, window.fullscreen_on == monitor.name, monitor.size, window.first_row])
     handle = windows.glfw.get_monitors()[0]
     # What glfw does before it calls: the window is one no longer on the monitor.
     windows.glfw.set_window_monitor(window.handle, None, 0, 0, *monitor.size, 0)
     windows._monitor_changed(handle, windows.glfw.DISCONNECTED)
-    windows.poll(0.3)
+    half = tuple(n // 2 for n in monitor.size)
+    settle(windows, lambda: window.size == half and window.position == (half[0] // 2, half[1] // 2))
     say([window.size, window.position, window.fullscreen_on])
     windows._monitor_changed(handle, windows.glfw.CONNECTED)
-    for event in windows.poll(0.3):
+    for event in settle(windows, lambda: window.size == monitor.size):
         tell(event)
     say([window.size, window.fullscreen_on == monitor.name])
 """
@@ -274,9 +297,9 @@ with Windows() as windows:
     far = windows.open("far", WindowPlace(position=(1700, 100), size=(64, 48)))
     near = windows.open("near", WindowPlace(position=(200, 100), size=(64, 48)))
     handle = windows.glfw.get_monitors()[0]
-    for change in (windows.glfw.DISCONNECTED, windows.glfw.CONNECTED):
+    for change, place in ((windows.glfw.DISCONNECTED, (0, 0)), (windows.glfw.CONNECTED, (1700, 100))):
         windows._monitor_changed(handle, change)
-        windows.poll(0.3)
+        settle(windows, lambda: far.position == place)
         say([far.position, near.position])
 """
     )

@@ -36,6 +36,14 @@ def run(windows: Windows, draw=lambda: None, seconds: float = 50.0) -> None:
     raise SystemExit("nobody asked to end")
 
 
+def settle(windows: Windows, done, seconds: float = 20.0) -> list[Event]:
+    """Events until something is so, or too late: the window system answers when it likes."""
+    end, events = monotonic() + seconds, windows.poll()
+    while not done() and monotonic() < end:
+        events += windows.poll(0.05)
+    return events
+
+
 def flat(colour: tuple[float, float, float], size: tuple[int, int]):
     """An eye target of one linear opaque colour."""
     from vr_plugin.eye_target import EyeTarget

@@ -102,7 +102,7 @@ class Window:
 
 
 class Windows:
-    """All windows of the program.
+    """All windows of the program; there is one of these at a time, for glfw is one.
 
     Parameters
     ----------
@@ -119,10 +119,14 @@ class Windows:
     MissingPackageError
         No glfw.
     WindowError
-        No display.
+        No display, or another of these is open.
     """
 
+    _there: Windows | None = None
+
     def __init__(self, vsync: bool = True):
+        if Windows._there is not None:
+            raise WindowError("the program's windows are open already: open more of them there")
         self.glfw = _load()
         self._vsync = vsync
         self._windows: list[Window] = []
@@ -136,6 +140,7 @@ class Windows:
             raise WindowError(f"no window can be opened: {reason}; {_NO_SCREEN}")
         self.monitors = Monitors(self.glfw)
         self.glfw.set_monitor_callback(self._monitor_changed)
+        Windows._there = self
 
     def __enter__(self) -> Windows:
         return self
@@ -232,7 +237,10 @@ class Windows:
         self._set_intervals()
 
     def close(self) -> None:
-        """Close all windows and let go of the display."""
+        """Close all windows and let go of the display; twice is once."""
+        if Windows._there is not self:
+            return
+        Windows._there = None
         for window in tuple(self._windows):
             window.close()
         self.glfw.terminate()
