@@ -60,14 +60,14 @@ def test_a_closed_context_leaves_the_one_before_current(gl_context):
 @pytest.mark.gl
 def test_a_context_released_or_closed_elsewhere_is_no_ones(gl_context):
     first, second = OffscreenContext(), OffscreenContext()
-    gl_context.make_current()
+    assert current()[3] == second._context
     first.close()
-    assert current()[3] is not None  # of another it takes nothing
-    second.make_current()
+    assert current()[3] == second._context
     second.release()
     assert current()[3] is None
     second.close()
     assert current()[3] is None
+    gl_context.make_current()
 
 
 @pytest.mark.gl
@@ -146,36 +146,40 @@ def test_the_processor_is_no_graphics_card(gl_context, scene_file, tmp_path):
 
 
 class Card:
-    """A stand-in for OpenGL on a graphics card, which draws `work` software pictures for each of its own."""
+    """A stand-in for OpenGL on a graphics card, with a clock: it takes `cost`, the processor 10."""
 
     is_software = False
 
-    def __init__(self, renderer, work):
-        self.context, self.renderer, self.work, self.drawn, self.closed = self, renderer, work, 0, False
+    def __init__(self, renderer, cost):
+        self.context, self.cost, self.time, self.drawn, self.closed = self, cost, 0.0, 0, False
+        self.warp, renderer.warp = renderer.warp, self.warp_slowly
+
+    def warp_slowly(self, *arguments):
+        self.time += 10
+        return self.warp(*arguments)
 
     def draw(self, image, view):
         self.drawn += 1
-        for _ in range(self.work):
-            self.renderer.warp(image, view)
+        self.time += self.cost
         return "the card's"
 
     def close(self):
         self.closed = True
 
 
-@pytest.mark.parametrize("work, chosen", [(60, "software"), (0, "texture")])
-def test_auto_takes_the_faster_on_a_card(monkeypatch, work, chosen):
-    """Sixty pictures against one, or none: which is faster does not hang on the clock."""
+@pytest.mark.parametrize("cost, chosen", [(11, "software"), (9, "texture")])
+def test_auto_takes_the_faster_on_a_card(monkeypatch, cost, chosen):
     view = View.look_at((60, 40, 50), (11, 11, 11), (0, 1, 0), 30, (128, 96))
     renderer = Renderer(Volume(ball()))
-    card = Card(renderer, work)
+    card = Card(renderer, cost)
     monkeypatch.setattr(warps, "_Offscreen", lambda size: card)
+    monkeypatch.setattr(warps, "perf_counter", lambda: card.time)
     with WarpChoice(renderer, "auto", view.size) as choice:
-        first, second = choice.render(view), choice.render(view)
+        pictures = [choice.render(view), choice.render(view)]
         assert choice.name == chosen
-        assert card.drawn == (2 if chosen == "software" else 4)  # two to choose
-        for picture in (first, second):
-            assert (isinstance(picture, str)) == (chosen == "texture")
+        assert card.drawn == (4 if chosen == "software" else 6)  # four to choose
+        assert all(isinstance(picture, str) == (chosen == "texture") for picture in pictures)
+        assert choice.last["warp_ms"] == 9000 or chosen == "software"
         assert not card.closed
     assert card.closed
 

@@ -22,7 +22,6 @@ def drawing() -> Iterator[None]:
         gl.GL_CULL_FACE,
         gl.GL_COLOR_LOGIC_OP,
         gl.GL_SAMPLE_ALPHA_TO_COVERAGE,
-        gl.GL_POLYGON_OFFSET_FILL,
     )
     switches = {name: gl.glIsEnabled(name) for name in (*on, *off, gl.GL_DEPTH_TEST)}
     get = gl.glGetIntegerv

@@ -33,7 +33,7 @@ float window_depth(vec2 zw) {
 # middle: the ray's largest component, and one face only, whatever the rounding.
 _FACES = f"""
 const float OWN = 1.00001;        // faces of several show tangents up to 1
-const float SLACK = 1.0 / 64.0;   // pixels of rounding
+const float SLACK = 1.0 / 512.0;  // pixels of rounding
 const float EVERYWHERE = 1e30;
 
 in vec2 ndc;
