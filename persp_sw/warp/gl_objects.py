@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Image
 from ..errors import GraphicsError
-from .context import opengl
+from .context import integers, opengl
 
 
 class Texture:
@@ -22,7 +22,7 @@ class Texture:
             "float16": (gl.GL_RGBA16F, gl.GL_HALF_FLOAT, gl.GL_LINEAR),
             "rgba8": (gl.GL_RGBA8, gl.GL_UNSIGNED_BYTE, gl.GL_LINEAR),
         }[precision]
-        largest = int(gl.glGetIntegerv(gl.GL_MAX_TEXTURE_SIZE))
+        (largest,) = integers(gl.GL_MAX_TEXTURE_SIZE)
         if max(size[:2]) > largest:
             raise GraphicsError(
                 f"an eye image of {size[0]}×{size[1]} pixels exceeds this OpenGL's textures, {largest}: "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from .context import opengl
+from .context import integers, opengl
 
 
 @contextmanager
@@ -24,15 +24,14 @@ def drawing() -> Iterator[None]:
         gl.GL_SAMPLE_ALPHA_TO_COVERAGE,
     )
     switches = {name: gl.glIsEnabled(name) for name in (*on, *off, gl.GL_DEPTH_TEST)}
-    get = gl.glGetIntegerv
-    equations = [get(name) for name in (gl.GL_BLEND_EQUATION_RGB, gl.GL_BLEND_EQUATION_ALPHA)]
+    equations = [integers(name)[0] for name in (gl.GL_BLEND_EQUATION_RGB, gl.GL_BLEND_EQUATION_ALPHA)]
     factors = [
-        get(name)
+        integers(name)[0]
         for name in (gl.GL_BLEND_SRC_RGB, gl.GL_BLEND_DST_RGB, gl.GL_BLEND_SRC_ALPHA, gl.GL_BLEND_DST_ALPHA)
     ]
-    depth_function, depth_mask = get(gl.GL_DEPTH_FUNC), gl.glGetBooleanv(gl.GL_DEPTH_WRITEMASK)
-    polygon_mode = get(gl.GL_POLYGON_MODE)[0]
-    program, vertex_array = get(gl.GL_CURRENT_PROGRAM), get(gl.GL_VERTEX_ARRAY_BINDING)
+    (depth_function,), (depth_mask,) = integers(gl.GL_DEPTH_FUNC), integers(gl.GL_DEPTH_WRITEMASK)
+    polygon_mode = integers(gl.GL_POLYGON_MODE)[0]
+    (program,), (vertex_array,) = integers(gl.GL_CURRENT_PROGRAM), integers(gl.GL_VERTEX_ARRAY_BINDING)
     reversed_depth = depth_function in (gl.GL_GREATER, gl.GL_GEQUAL)
     try:
         with _texture_unit():
@@ -73,8 +72,8 @@ def uploading() -> Iterator[None]:
         gl.GL_UNPACK_SKIP_IMAGES: 0,
         gl.GL_UNPACK_ALIGNMENT: 4,
     }
-    before = {name: gl.glGetIntegerv(name) for name in rows}
-    buffer = gl.glGetIntegerv(gl.GL_PIXEL_UNPACK_BUFFER_BINDING)
+    before = {name: integers(name)[0] for name in rows}
+    (buffer,) = integers(gl.GL_PIXEL_UNPACK_BUFFER_BINDING)
     try:
         with _texture_unit():
             gl.glBindBuffer(gl.GL_PIXEL_UNPACK_BUFFER, 0)
@@ -91,10 +90,10 @@ def uploading() -> Iterator[None]:
 def _texture_unit() -> Iterator[None]:
     """Texture unit 0 is active, its textures free to be bound and no sampler object over them."""
     gl = opengl()
-    active = gl.glGetIntegerv(gl.GL_ACTIVE_TEXTURE)
+    (active,) = integers(gl.GL_ACTIVE_TEXTURE)
     gl.glActiveTexture(gl.GL_TEXTURE0)
     array, flat = (gl.glGetIntegerv(n) for n in (gl.GL_TEXTURE_BINDING_2D_ARRAY, gl.GL_TEXTURE_BINDING_2D))
-    sampler = gl.glGetIntegerv(gl.GL_SAMPLER_BINDING)
+    (sampler,) = integers(gl.GL_SAMPLER_BINDING)
     gl.glBindSampler(0, 0)
     try:
         yield

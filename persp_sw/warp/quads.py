@@ -191,7 +191,8 @@ def _checked(matrix: Matrix) -> Matrix:
 
 def _in_window(corners: Array) -> Array:
     """(n, 2) normalized device coordinates of a polygon (x, y, w), clipped to the window."""
-    for row in _WINDOW:
+    outside = (corners @ _WINDOW.T < 0).any(0)
+    for row in _WINDOW[outside]:
         side = corners @ row
         if (side >= 0).all():
             continue

@@ -12,7 +12,7 @@ from ..errors import GraphicsError, ViewError
 from ..eye_image import EyeImage
 from ..geometry.view import View
 from . import shaders
-from .context import opengl
+from .context import integers, opengl
 from .gl_objects import Program, Texture
 from .gl_state import drawing, uploading
 from .quads import Quads, Shown
@@ -241,6 +241,5 @@ def _draw(gl, program: Program, outline: NDArray, depth: bool) -> None:
 
 def _zero_to_one(gl) -> bool:
     """Whether the host's clip space has depths 0 … 1 (glClipControl, OpenGL 4.5)."""
-    if (int(gl.glGetIntegerv(gl.GL_MAJOR_VERSION)), int(gl.glGetIntegerv(gl.GL_MINOR_VERSION))) < (4, 5):
-        return False
-    return np.ravel(gl.glGetIntegerv(gl.GL_CLIP_DEPTH_MODE))[0] == gl.GL_ZERO_TO_ONE
+    version = *integers(gl.GL_MAJOR_VERSION), *integers(gl.GL_MINOR_VERSION)
+    return version >= (4, 5) and integers(gl.GL_CLIP_DEPTH_MODE) == [gl.GL_ZERO_TO_ONE]
