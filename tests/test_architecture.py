@@ -62,6 +62,7 @@ RESERVED = {
     },
     "glfw": {"vr_plugin.window"},
     "imgui_bundle": {"vr_plugin.panel"},
+    "socket": {f"vr_plugin.trackers.{name}" for name in ("dtrack", "vrpn_client", "vrpn_server")},
 }
 
 
