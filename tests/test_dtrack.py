@@ -113,8 +113,10 @@ def test_what_cannot_be_read_is_counted_and_left_out(entry, damaged):
 
 def test_no_time_means_the_time_of_arrival():
     for line in (b"", b"ts -1\r\n", b"ts nan\r\n", b"ts 1e300\r\n"):
-        (sample,) = DTrackSamples().read([line + b"6d 1 [0 1.0][1 2 3 0 0 0][1 0 0 0 1 0 0 0 1]\0"], 3.0)
-        assert sample.stamp == 3.0
+        packets = DTrackSamples()
+        for now in (3.0, 3.1, 3.2):
+            (sample,) = packets.read([line + b"6d 1 [0 1.0][1 2 3 0 0 0][1 0 0 0 1 0 0 0 1]\0"], now)
+            assert sample.stamp == now
 
 
 # --- over a socket -----------------------------------------------------------------------------------------

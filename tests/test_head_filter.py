@@ -91,13 +91,22 @@ def test_prediction_helps_on_a_real_path():
     recording = Recording.load(data_path("tracking", "hololens-200hz.csv.gz"))
     head, tracker, ahead = HeadFilter(REST), PathTracker(recording, start=0.0), 0.03
     plain, predicted = [], []
-    for now in np.arange(0, 55, 1 / 60):
+    for now in np.arange(0, 15, 1 / 60):
         head.add(tracker.poll(float(now)))
         true = recording.at(now + ahead)
         predicted.append(np.linalg.norm(head.pose_at(now + ahead).position - true.position))
         plain.append(np.linalg.norm(recording.at(now).position - true.position))
     assert head.outliers == 0
     assert np.median(predicted) < 0.3 * np.median(plain)
+
+
+def test_noise_of_a_fast_tracker_is_not_blown_up(rng):
+    sigma, ahead, errors = 0.0005, 0.05, []
+    for _ in range(100):
+        head = fed(*(pose_sample(i / 500, rng.normal(0, sigma, 3)) for i in range(40)))
+        errors.append(head.pose_at(39 / 500 + ahead).position)
+    # σ·√((1 + L/b)² + (L/b)²), 3.2 σ at b = 30 ms; 36 σ from one sample to the next.
+    assert np.sqrt(np.mean(np.square(errors))) < 4 * sigma
 
 
 def test_nobody_is_predicted_far():

@@ -126,6 +126,8 @@ def test_grabbing_and_scaling_at_once_keep_the_hold(rng):
         at = random_pose(rng)
         wand.update([hand(at, i / 60)], i / 60)
         np.testing.assert_allclose(apply(wand.room_from_world, grip), at.position, atol=1e-9)
+    scales = [np.cbrt(np.linalg.det(m[:3, :3])) for m in (start, wand.room_from_world)]
+    assert scales[1] / scales[0] == pytest.approx(np.exp(29 / 60))
 
 
 def test_the_clip_plane_goes_through_the_hand_and_keeps_what_it_points_to(rng):
