@@ -26,7 +26,7 @@ from ..pose import Pose, PoseError, rotation_of
 PORT = 5000
 MAX_PACKET = 65536
 MAX_LINES = 64
-MAX_ENTRIES = 256
+MAX_ENTRIES = 128  # of a whole packet
 MAX_ID = 4096
 MAX_NUMBER = 1e9  # mm
 MAX_BUTTONS, MAX_AXES = 256, 64
@@ -58,7 +58,7 @@ class Packet:
 def read(data: bytes) -> Packet:
     """What a packet says. Never raises: what cannot be read is counted and left out."""
     text = data[:MAX_PACKET].split(b"\0", 1)[0].decode("ascii", "replace")
-    frame, seconds, damaged = -1, math.nan, 0
+    frame, seconds, damaged, entries = -1, math.nan, 0, 0
     found: dict[str, list[Body]] = {"6d": [], "6df2": []}
     for line in text.splitlines()[:MAX_LINES]:
         kind, _, rest = line.strip().partition(" ")
@@ -72,7 +72,11 @@ def read(data: bytes) -> Packet:
                 size, make = (3, _body) if kind == "6d" else (4, _flystick)
                 if len(blocks) % size:
                     damaged += 1
-                for i in range(0, min(len(blocks), size * MAX_ENTRIES) - size + 1, size):
+                for i in range(0, len(blocks) - size + 1, size):
+                    entries += 1
+                    if entries > MAX_ENTRIES:
+                        damaged += 1
+                        break
                     try:
                         found[kind].append(make(*blocks[i : i + size]))
                     except (ValueError, PoseError):

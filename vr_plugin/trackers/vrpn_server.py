@@ -82,13 +82,11 @@ class VrpnServer:
         self._socket.close()
 
     def _accept(self, now: float) -> None:
-        while True:
+        for _ in range(MAX_CLIENTS):
             try:
                 peer, _ = self._socket.accept()
-            except BlockingIOError:
+            except OSError:  # nobody there, or not any more
                 return
-            except OSError:  # it has left again
-                continue
             if len(self._clients) >= MAX_CLIENTS:
                 peer.close()
                 continue
