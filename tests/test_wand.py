@@ -170,6 +170,15 @@ def test_reset_puts_all_back_even_while_grabbed(rng):
     np.testing.assert_array_equal(wand.room_from_world, start)
 
 
+def test_a_reset_from_outside_takes_the_volume_out_of_the_hand(rng):
+    start = similarity(rng)
+    wand = Wand(start)
+    wand.update([hand(random_pose(rng)), buttons(0), hand(random_pose(rng), 0.01)], 0.0)
+    wand.reset()
+    assert not wand.update([hand(random_pose(rng), 0.02)], 0.02)
+    np.testing.assert_array_equal(wand.room_from_world, start)
+
+
 def test_a_hand_that_was_not_seen_takes_hold_anew(rng):
     start = similarity(rng)
     wand = Wand(start)

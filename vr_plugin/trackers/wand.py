@@ -123,6 +123,11 @@ class Wand:
         self._drive(now)
         return self.room_from_world is not before[0] or self.clip_plane is not before[1]
 
+    def reset(self) -> None:
+        """The volume to where it stood at first, out of the hand, and without a clip plane."""
+        self.room_from_world, self.clip_plane = self.start.copy(), None
+        self._hand_from_world = None
+
     def _down(self, button: int | None, pressed: tuple[bool, ...]) -> bool:
         return button is not None and button < len(pressed) and pressed[button]
 
@@ -130,8 +135,7 @@ class Wand:
         before, self._pressed = self._pressed, pressed
         keys = self.bindings
         if self._down(keys.reset, pressed) and not self._down(keys.reset, before):
-            self.room_from_world, self.clip_plane = self.start.copy(), None
-            self._hand_from_world = None
+            self.reset()
             return
         if self.hand is None:
             return
