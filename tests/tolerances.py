@@ -161,6 +161,11 @@ NO_POP = 1.5
 # apart, 0.05 measured; a checkerboard nearly all, 0.01.
 FLICKER = 0.1
 
+# --- Wall files --------------------------------------------------------------------------------------------
+
+# Corners within 10 m: sums and products of a few float64 numbers, 1e-15 of their size each.
+RIG_CORNERS = 1e-12
+
 # --- Tracking ---------------------------------------------------------------------------------------------
 
 # Prediction over times of 5 … 80 ms, of a motion with angular frequencies of up to 5 rad/s: the next term of
