@@ -1,13 +1,23 @@
-"""Small wall files of other systems, with corners that can be worked out in the head."""
+"""Small wall files of other systems, with corners for the head; questions to what was read."""
 
 from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from tolerances import RIG_CORNERS
+
+from vr_plugin.formats import Reading, import_rig
+from vr_plugin.rig import RigWall
 
 # Two walls 2 × 2 at right angles: the front one at z = −1, the left one at x = −1.
 PVX = """<?xml version="1.0" ?>
 <pvx>
   <Process Type="client"/>
   <Process Type="server">
-    <EyeSeparation Value="0.5"/>
+    <EyeSeparation Value="0.125"/>
     <Machine Name="front" Environment="DISPLAY=node1:0" Geometry="640x480+10+20" StereoType="Crystal Eyes"
       LowerLeft="-1 -1 -1" LowerRight="1 -1 -1" UpperRight="1 1 -1"/>
     <Machine Name="side" Environment="DISPLAY=node2:0.1" Geometry="500x500-5+0" FullScreen="1"
@@ -139,3 +149,33 @@ def jconf(elements: str) -> str:
         '<configuration xmlns="http://www.vrjuggler.org/jccl/xsd/3.0/configuration">'
         f"<elements>{elements}</elements></configuration>"
     )
+
+
+def corners(reading: Reading, name: str) -> np.ndarray:
+    """Lower left, lower right and upper left of a wall."""
+    found = wall(reading, name).wall
+    return np.array([found.lower_left, found.lower_right, found.upper_left])
+
+
+def wall(reading: Reading, name: str) -> RigWall:
+    """The wall of a name."""
+    return next(wall for wall in reading.rig.walls if wall.name == name)
+
+
+def near(found: np.ndarray, expected: ArrayLike) -> bool:
+    """Whether positions agree as well as sums of a few numbers can."""
+    return bool(np.abs(np.asarray(found) - np.asarray(expected, float)).max() <= RIG_CORNERS)
+
+
+def said(reading: Reading, *words: str) -> bool:
+    """Whether a note has all these words."""
+    return any(all(word in note for word in words) for note in reading.notes)
+
+
+def read_in(
+    folder: Path, text: str, unit: str | None = None, name: str = "walls.xml", **options: Any
+) -> Reading:
+    """What a text says as a wall file."""
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return import_rig(path, unit, **options)

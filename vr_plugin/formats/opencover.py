@@ -205,8 +205,9 @@ def _read_viewer(shown: list[Settings], draft: Draft, report: Report) -> None:
         with report.part("the viewer's place"):
             if settings.has(path):
                 places[settings.host] = tuple(settings.number(path, axis) for axis in "xyz")
-            if settings.is_on(f"{_TOP}.Stereo", default=True):
-                distances[settings.host] = _eye_distance(settings, report)
+            distance = _eye_distance(settings, report)
+            if distance is not None and settings.is_on(f"{_TOP}.Stereo", default=True):
+                distances[settings.host] = distance
     for what, values in (("the viewer", places), ("the distance of the eyes", distances)):
         if len(set(values.values())) > 1:
             host = next(iter(values))
@@ -217,18 +218,16 @@ def _read_viewer(shown: list[Settings], draft: Draft, report: Report) -> None:
         draft.eye_separation = next(iter(distances.values()))
 
 
-def _eye_distance(settings: Settings, report: Report) -> float:
-    """The default person's, else the host's."""
-    text = settings.text(f"{_TOP}.Stereo", "separation")
-    if text.upper().startswith("AUTO"):
-        report.note("the eyes' separation is AUTO; 64 mm taken")
-        common = 64.0
-    else:
-        common = settings.number(f"{_TOP}.Stereo", "separation", 64.0)
+def _eye_distance(settings: Settings, report: Report) -> float | None:
+    """The default person's, else the host's; None: not stated."""
     for person in settings.elements(f"{_TOP}.Input.Persons.Person"):
         if person.get("default").lower() == "true" and person.get("eyeDistance"):
             return report.number(settings.where(person), "eyeDistance", person.get("eyeDistance"))
-    return common
+    text = settings.text(f"{_TOP}.Stereo", "separation")
+    if text.upper().startswith("AUTO"):
+        report.note("the eyes' separation is AUTO, which is not read")
+        return None
+    return settings.number(f"{_TOP}.Stereo", "separation") if text else None
 
 
 def _say_the_rest(sections: list[Element], report: Report) -> None:

@@ -94,7 +94,7 @@ def _wall(machine: Element, name: str, report: Report) -> DraftWall:
     else:
         wall.window = WindowPlace(fullscreen=True)
     if machine.get("FullScreen").lower() in ("1", "true", "yes"):
-        wall.window = WindowPlace(wall.window.monitor, wall.window.position, wall.window.size, True)
+        wall.window = WindowPlace(fullscreen=True)
     wall.stereo = _stereo(machine, where, report)
     wall.machine = _display(machine)
     for key in machine.attributes:

@@ -135,7 +135,7 @@ def _place(window: Element, viewport: Element, wall: DraftWall, report: Report) 
     wall.pixels = size
     position = (round(x + width * start[0]), round(y + height * start[1]))
     full = window.value("full_screen").lower() in ("true", "1")
-    wall.window = WindowPlace(position=position, size=size, fullscreen=full)
+    wall.window = WindowPlace(fullscreen=True) if full else WindowPlace(position=position, size=size)
 
 
 def _count_from_top(walls: list[DraftWall], report: Report) -> None:
@@ -147,8 +147,7 @@ def _count_from_top(walls: list[DraftWall], report: Report) -> None:
     }
     for wall in placed:
         (x, y), size = wall.window.position, wall.window.size
-        place = WindowPlace(None, (x, tops[wall.machine] - y - size[1]), size, wall.window.fullscreen)
-        wall.window = place
+        wall.window = WindowPlace(position=(x, tops[wall.machine] - y - size[1]), size=size)
     if placed and any(wall.window.position != (0, 0) for wall in placed):
         report.note("windows were counted from a screen's lower edge; ours hang from the top of the highest")
 
