@@ -221,3 +221,25 @@ def test_notes_of_read_rig_are_warnings(tmp_path: Path, caplog: pytest.LogCaptur
     path.write_text(PVX)
     assert len(read_rig(path, "m").walls) == 2
     assert any("Sparkle" in record.getMessage() for record in caplog.records)
+
+
+def test_a_viewer_of_unknown_place_rests_before_all_walls(read_walls):
+    # VR Juggler's head starts at the origin, which is in the plane of a floor at y = 0: it stands up.
+    floor = {
+        "lower_left": (-1, 0, 1), "lower_right": (1, 0, 1),
+        "upper_right": (1, 0, -1), "upper_left": (-1, 0, -1),
+    }  # fmt: skip
+    tall = {"upper_right": (1, 3, -2), "upper_left": (-1, 3, -2)}
+    reading = read_walls(jconf(window("floor", viewport(**floor)) + window("front", viewport(**tall))))
+    assert near(reading.rig.eyes.rest_pose.position, [0, 1.7, 0])
+    assert said(reading, "at rest", "standing")
+    # Before a wall that does not reach to there, and whose plane has the origin: a metre off its middle.
+    flat = '<pvx><Machine Name="w" LowerLeft="-1 -1 0" LowerRight="1 -1 0" UpperRight="1 1 0"/></pvx>'
+    assert near(read_walls(flat, "m").rig.eyes.rest_pose.position, [0, 0, 1])
+
+
+def test_walls_of_one_name_get_names_of_their_own(read_walls):
+    one = '<Machine Name="w" LowerLeft="-1 -1 {0}" LowerRight="1 -1 {0}" UpperRight="1 1 {0}"/>'
+    reading = read_walls("<pvx>" + "".join(one.format(z) for z in (-1, -2, -3)) + "</pvx>", "m")
+    names = [wall.name for wall in reading.rig.walls]
+    assert len(set(names)) == 3 and all(name.startswith("w") for name in names)

@@ -124,11 +124,17 @@ def test_a_floor_lies_below_and_is_seen_from_above(read_walls):
     assert all(before_wall(np.zeros(3), wall) for wall in reading.rig.corners)
 
 
-def test_a_screen_can_be_a_projectors_frustum(read_walls):
-    text = covise().replace(
-        'comment="FRONT"', 'comment="FRONT" frustum="0;0;500;0;0;0;-45;45;-45;0" radius="1000"'
-    )
-    assert near(corners(read_walls(text), "FRONT"), [[-1, -0.5, -1], [1, -0.5, -1], [-1, 0.5, -1]])
+@pytest.mark.parametrize(
+    ("heading", "expected"),
+    [
+        ("0", [[-1, -0.5, -1], [1, -0.5, -1], [-1, 0.5, -1]]),
+        ("90", [[-1, -0.5, 1], [-1, -0.5, -1], [-1, 0.5, 1]]),
+    ],
+)
+def test_a_screen_can_be_a_projectors_frustum(read_walls, heading: str, expected: list):
+    # From 0.5 m up, 45° to both sides and down to the lower edge, none up: 2 m × 1 m at 1 m.
+    frustum = f'comment="FRONT" frustum="0;0;500;{heading};0;0;-45;45;-45;0" radius="1000"'
+    assert near(corners(read_walls(covise().replace('comment="FRONT"', frustum)), "FRONT"), expected)
 
 
 def test_hosts_of_two_names_are_one_and_every_host_sees_its_own(read_walls):

@@ -114,6 +114,9 @@ def test_old_encodings_and_a_harmless_doctype_are_read(tmp_path: Path):
     for encoding in ("utf-8-sig", "utf-16", "iso-8859-1"):
         path.write_bytes(text.encode(encoding))
         assert import_rig(path, "m").rig.walls[0].name == "Wände"
+    text = PVX.replace("front", "€").replace('"1.0"', '"1.0" encoding="windows-1252"')
+    path.write_bytes(text.encode("windows-1252"))
+    assert import_rig(path, "m").rig.walls[0].name == "€"
 
 
 _TEXTS = {
