@@ -186,6 +186,7 @@ def test_calvr_screens_of_several_roots(read_walls):
 def test_calvr_walls_for_fixed_eyes_are_seen_from_there(read_walls):
     alone = read_walls(CALVR, "mm", hosts=("b",))
     assert near(alone.rig.eyes.rest_pose.position, [0, 0.25, -3])
+    assert near(rotation_of(alone.rig.eyes.rest_pose.orientation) @ [0, 0, -1], [0, 0, 1])  # at its wall
     assert all(before_wall(alone.rig.eyes.rest_pose.position, wall) for wall in alone.rig.corners)
     assert said(read_walls(CALVR, "mm"), "fixed eyes", "--host")
 

@@ -141,6 +141,8 @@ def test_real_walls_back_to_back_are_seen_host_by_host():
     for host, eye in {"vsage-00": (0, 0, -3), "vcglx2-10": (-3, 0, 0), "vcglx1-10": (3, 0, 0)}.items():
         rig = import_rig(path, "mm", hosts=[host]).rig
         assert np.abs(rig.eyes.rest_pose.position - eye).max() < RIG_CORNERS
+        forward = rig.eyes.rest_pose.apply([0.0, 0.0, -1.0]) - eye
+        assert forward @ (rig.middle - eye) > 0.7 * np.linalg.norm(rig.middle - eye)
         assert_sound(rig)
     front = import_rig(path, "mm", hosts=["vcalvr-00"]).rig
     expected = [[-2.044, 0.004, 0], [-1.028, 0.004, 0], [-2.044, 0.572, 0]]
@@ -189,6 +191,7 @@ def test_real_files_of_vr_juggler():
         opposite = {one, other} in ({"Right", "Left"}, {"Floor", "Ceiling"}, {"Front", "Entrance"})
         assert shared_corners(cave, f"{one} Surface", f"{other} Surface") == (0 if opposite else 2)
     assert all(before_wall(cave.eyes.rest_pose.position, wall) for wall in cave.corners)
+    assert np.array_equal(cave.eyes.rest_pose.orientation, [0, 0, 0, 1])  # walls all around: straight ahead
     (eye,) = import_rig(real("vrjuggler-hmd.displays.jconf")).rig.walls
     assert (eye.name, eye.stereo, eye.fixed_to) == ("Left Eye", "left", "head")
 

@@ -15,7 +15,7 @@ from ..rig import Eyes, Rig, RigError, RigWall, TrackerPlace
 from ..rig_check import LARGEST_WALL, findings
 from .draft import Draft, DraftTracker, DraftWall
 from .report import Report, printable
-from .rest import rest_place
+from .rest import rest_pose
 from .units import ask_for_unit, metres_per_unit
 
 # Rows of a wall whose file states no pixels.
@@ -57,7 +57,7 @@ def assemble(
     separation = Eyes.separation
     with report.part("the distance of the eyes"):
         separation = _separation(draft, scale, file, report)
-    eyes = Eyes(separation, rest_pose=Pose(rest_place(draft, walls, scale, report)))
+    eyes = Eyes(separation, rest_pose=rest_pose(draft, walls, scale, report))
     rig_walls = []
     for wall, name in zip(walls, named, strict=True):
         size = wall.pixels or pixels or _usual_pixels(wall, name, report)

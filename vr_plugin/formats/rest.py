@@ -4,15 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..pose import Pose, turn_about
 from .draft import Draft, DraftWall
 from .report import Report
 
 # An eye nearer to a wall's plane sees next to nothing of it, metres.
 _NEAREST_REST = 0.1
 _STANDING_EYES = np.array([0.0, 1.7, 0.0])
+# A head outside the walls that would turn by more than this to face their middle is turned to it, radians.
+_LOOKS_AWAY = np.pi / 4
 
 
-def rest_place(draft: Draft, walls: list[DraftWall], scale: float, report: Report) -> np.ndarray:
+def rest_pose(draft: Draft, walls: list[DraftWall], scale: float, report: Report) -> Pose:
+    """room_from_head before anything tracks: looking along −z, or at walls that are elsewhere."""
+    place = _place(draft, walls, scale, report)
+    corners = np.array([_four_corners(wall) for wall in walls if wall.fixed_to == "room"]) * scale
+    if not len(corners):
+        return Pose(place)
+    points = corners.reshape(-1, 3)[:, [0, 2]] - place[[0, 2]]
+    if ((points.min(0) <= 0) & (points.max(0) >= 0)).all():  # among them
+        return Pose(place)
+    x, z = points.mean(0)
+    angle = np.arctan2(-x, -z)
+    return Pose(place, turn_about((0, 1, 0), angle)) if abs(angle) > _LOOKS_AWAY else Pose(place)
+
+
+def _place(draft: Draft, walls: list[DraftWall], scale: float, report: Report) -> np.ndarray:
     """Where the viewer's eyes are before anything tracks, metres."""
     fixed = _fixed_viewer(walls, report)
     if fixed is not None:
