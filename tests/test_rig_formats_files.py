@@ -10,6 +10,7 @@ import pytest
 from click.testing import CliRunner
 from rig_texts import CALVR, CALVR_INPUT, INPUT, PVX, covise, jconf, viewport, window
 
+from persp_sw.cli import main
 from persp_sw.errors import PerspSWError
 from vr_plugin.commands.rig_convert import convert
 from vr_plugin.formats import import_rig
@@ -226,3 +227,14 @@ def test_convert_refuses_what_it_cannot_do(tmp_path: Path):
     ):
         error = CliRunner().invoke(convert, arguments).exception
         assert isinstance(error, RigError) and told in str(error)
+
+
+def test_convert_is_a_command_of_rig_and_its_errors_are_advice(tmp_path: Path):
+    source, ours = tmp_path / "wall.pvx", tmp_path / "rig.toml"
+    source.write_text(PVX)
+    result = CliRunner().invoke(main, ["rig", "convert", str(source), "--unit", "m", "-o", str(ours)])
+    assert result.exit_code == 0, result.output
+    assert len(load_rig(ours).walls) == 2
+    result = CliRunner().invoke(main, ["rig", "convert", str(source)])
+    assert result.exit_code == 2
+    assert "--unit" in result.output and "Traceback" not in result.output
