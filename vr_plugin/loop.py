@@ -100,10 +100,9 @@ class Loop:
 
     def put_back(self) -> None:
         """The volume to where it stood at first, with no clip plane but the scene's."""
-        matrix = room_from_world(self.rig, self.renderer.volume)
         if self.wand is not None:
-            self.wand.room_from_world, self.wand.clip_plane = matrix, None
-        self.maker.room_from_world = matrix
+            self.wand.reset()
+        self.maker.room_from_world = room_from_world(self.rig, self.renderer.volume)
         self.renderer.regions = self._regions
 
     def close(self) -> None:
