@@ -12,8 +12,7 @@ warp. Last, how often the texture warp is faster for `render`: what `--warp auto
 from __future__ import annotations
 
 import argparse
-from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 
 import numpy as np
 from OpenGL import GL
@@ -25,16 +24,19 @@ from persp_sw.warp.canvas import Canvas
 TRANSFER = [(0, (0, 0, 0), 0), (60, (0.9, 0.5, 0.3), 0.02), (160, (1, 0.9, 0.8), 0.7), (255, (1, 1, 1), 1)]
 
 
+clock = perf_counter
+
+
 def ms(function, repeats: int) -> float:
-    """Median milliseconds of calls, OpenGL's work included; the first two warm up."""
+    """Least milliseconds of a call, OpenGL's work included: what else runs here only adds to it."""
     times = []
-    for _ in range(repeats + 2):
+    for _ in range(repeats):
         GL.glFinish()
-        start = perf_counter()
+        start = clock()
         function()
         GL.glFinish()
-        times.append(1e3 * (perf_counter() - start))
-    return median(times[2:])
+        times.append(1e3 * (clock() - start))
+    return min(times)
 
 
 def wall_ms(warp, view, options, ends) -> float:
@@ -94,7 +96,13 @@ def main():
     parser.add_argument("--volume", type=int, default=128, help="voxels an edge")
     parser.add_argument("--walls", type=int, default=4, help="walls that one upload serves")
     parser.add_argument("--repeats", type=int, default=30)
+    parser.add_argument(
+        "--cpu", action="store_true", help="processor time of all threads: for llvmpipe on a busy machine"
+    )
     options = parser.parse_args()
+    if options.cpu:
+        global clock
+        clock = process_time
     with psw.OffscreenContext() as context:
         print(context.renderer)
         rows = [case(size, inside, options) for size in options.sizes for inside in (False, True)]

@@ -41,8 +41,7 @@ out vec4 colour;
 uniform sampler2DArray texels;
 uniform mat3 face_from_ndc[{MOST_FACES}];
 uniform vec2 last[{MOST_FACES}];     // size − 1
-#ifdef SEVERAL
-uniform int faces;
+#ifdef FACES
 uniform vec2 middle[{MOST_FACES}];   // tangents
 uniform float pitch;
 #endif
@@ -80,15 +79,16 @@ vec2 middle_of_ray(vec3 start, vec3 along) {{
 
 void main() {{
     int face = 0;
-#ifdef SEVERAL
+    vec2 size = last[0];
+#ifdef FACES
     float best = EVERYWHERE;
     vec2 place = vec2(0.0);
-    for (int n = 0; n < faces; n++) {{
+    for (int n = 0; n < FACES; n++) {{
         vec3 point = face_from_ndc[n] * vec3(ndc, 1.0);
         if (point.z > 0.0) {{
             vec2 found = point.xy / point.z, tangents = abs(middle[n] + pitch * found);
             float steepest = max(tangents.x, tangents.y);
-            if (steepest < best) {{ best = steepest; face = n; place = found; }}
+            if (steepest < best) {{ best = steepest; face = n; place = found; size = last[n]; }}
         }}
     }}
     if (best > OWN) discard;
@@ -97,7 +97,7 @@ void main() {{
     if (!(point.z > 0.0)) discard;
     vec2 place = point.xy / point.z;
 #endif
-    vec2 size = last[face], at = place + 0.5 * size;
+    vec2 at = place + 0.5 * size;
     if (any(lessThan(at, vec2(-SLACK))) || any(greaterThan(at, size + SLACK))) discard;
 #ifdef EXACT
     // A texture unit's own filter has weights of 8 bits on most hardware.
@@ -144,8 +144,8 @@ void main() {
 def face_sources(options: frozenset[str]) -> tuple[str, str]:
     """Vertex and fragment shader that draw faces of an eye image.
 
-    Options: SEVERAL faces; PARALLEL rays; EXACT filtering in float32; DEPTH of each ray (else none), with a
-    NEAR distance and PLANES of regions if there are.
+    Options: "FACES n" if there are several; PARALLEL rays; EXACT filtering in float32; DEPTH of each ray (else
+    none), with a NEAR distance and PLANES of regions if there are.
     """
     return _HEADER + _VERTEX, _source(_FACES, options)
 

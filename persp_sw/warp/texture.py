@@ -99,7 +99,8 @@ class TextureWarp:
         if shown is None or held.texture is None:
             return
         depth = depth_test and held.quads.bounded
-        options = {"SEVERAL": len(held.image.faces) > 1, "PARALLEL": held.image.eye.is_at_infinity}
+        faces = len(held.image.faces)
+        options = {f"FACES {faces}": faces > 1, "PARALLEL": held.image.eye.is_at_infinity}
         options |= {"DEPTH": depth, "EXACT": self.precision == "float32"}
         options |= {
             "NEAR": depth and held.image.eye.near > 0,
@@ -206,9 +207,8 @@ def _face_uniforms(held: _Slot, shown: Shown, options: dict[str, bool]) -> dict[
         "face_from_ndc": shown.face_from_ndc,
         "last": np.array([face.size for face in image.faces]) - 1,
     }
-    if options["SEVERAL"]:
-        pitch = np.float32(image.faces[0].pitch)
-        uniforms |= {"faces": np.int32(len(image.faces)), "middle": quads.middles, "pitch": pitch}
+    if len(image.faces) > 1:
+        uniforms |= {"middle": quads.middles, "pitch": np.float32(image.faces[0].pitch)}
     if options["DEPTH"]:
         planes = image.half_spaces[: shaders.MOST_PLANES].copy()
         planes[:, 3] += planes[:, :3] @ quads.base
