@@ -21,7 +21,7 @@ class WarpChoice:
     ----------
     wanted
         "texture", "software" or "auto": software where there is no graphics card, for a software rasteriser
-        takes twice to five times its time (`benchmarks/texture_warp.py`); with one, the faster of the two
+        takes three times its time and more (`benchmarks/texture_warp.py`); with one, the faster of the two
         on the first picture, reading it back included.
     size
         Width and height of the pictures.

@@ -144,8 +144,8 @@ void main() {
 def face_sources(options: frozenset[str]) -> tuple[str, str]:
     """Vertex and fragment shader that draw faces of an eye image.
 
-    Options: "FACES n" if there are several; PARALLEL rays; EXACT filtering in float32; DEPTH of each ray (else
-    none), with a NEAR distance and PLANES of regions if there are.
+    Options: "FACES n" if there are several; PARALLEL rays; EXACT filtering in float32; DEPTH of each ray
+    (else none), with a NEAR distance and PLANES of regions if there are.
     """
     return _HEADER + _VERTEX, _source(_FACES, options)
 
