@@ -30,12 +30,6 @@ MARKER_PIXELS = 0.05
 # Sums of a few thousand float64 numbers of order 1.
 METRIC = 1e-12
 
-# --- Papers repeated ---------------------------------------------------------------------------------------
-
-# Both warps' pictures, float32 textures of 64 pixels and less: places err by a few roundings of 6e-8 · 64,
-# some 2e-5 of the difference of neighbouring pixels.
-WARPS_AGREE = 1e-4
-
 # --- Compositing -------------------------------------------------------------------------------------------
 
 # Alpha errs by float32 rounding, 6e-8 a slice, and depths, counted from the volume's front, by 6e-8 of the

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
 from ...arrays import Image
 from ...errors import PerspSWError
 from ...eye_image import EyeImage
 from ...geometry.view import View
 from ...renderer import Renderer
+from ...warp.context import OffscreenContext, opengl
+from ...warp.framebuffer import Framebuffer
+from ...warp.texture import TextureWarp
 from .painter import Row
-
-if TYPE_CHECKING:
-    from ...warp.framebuffer import Framebuffer
-    from ...warp.texture import TextureWarp
 
 
 class OffscreenWarp:
@@ -37,8 +35,6 @@ class OffscreenWarp:
 
     def finish(self) -> None:
         """See `painter.Warp`."""
-        from ...warp.context import opengl
-
         opengl().glFinish()
 
     def picture(self, view: View, slot: str) -> Image:
@@ -52,8 +48,6 @@ class OffscreenWarp:
         self._framebuffers.clear()
 
     def _drawn(self, view: View, slot: str) -> Framebuffer:
-        from ...warp.framebuffer import Framebuffer
-
         key = slot, view.wall.name, view.size
         framebuffer = self._framebuffers.get(key)
         if framebuffer is None:
@@ -70,11 +64,8 @@ def texture_warp() -> Iterator[tuple[OffscreenWarp | None, Row]]:
     Without OpenGL None and `missing`: why there is none.
     """
     try:
-        from ...warp.context import OffscreenContext
-        from ...warp.texture import TextureWarp
-
         context = OffscreenContext()
-    except (ImportError, PerspSWError) as error:
+    except PerspSWError as error:
         yield None, {"missing": f"no OpenGL here: {error}"}
         return
     with context, TextureWarp() as warp:
