@@ -77,8 +77,8 @@ ASSUMED = {
         "the other side follows the volume",
         "tables 2 to 4 and figure 5 on one thread, for the paper used one processor; what OpenGL does on the "
         "processor itself takes as many as it likes",
-        "times are medians; the error is that of the path's last picture to a float64 reference of the same "
-        "voxels, peak 1",
+        "times are medians, here and there the least beside, for other work may share the machine; the error "
+        "is that of the path's last picture to a float64 reference of the same voxels, peak 1",
     ],
     "engine": [
         "the engine file's last 18 of 128 slices hold nothing of it: its first 110 give the paper's 55 and "
