@@ -401,9 +401,10 @@ def test_nothing_to_draw_is_no_error():
 
 def test_text_shows_and_is_made_anew_only_when_it_changes():
     from vr_plugin.eye_target import EyeTarget
+    from vr_plugin.lettering import text_panel
     from vr_plugin.present import Composer, read_screen
     from vr_plugin.shapes import Shapes
-    from vr_plugin.text_overlay import Overlay, text_panel
+    from vr_plugin.text_overlay import Overlay
 
     size = (240, 120)
     target, overlay, composer = EyeTarget(size), Overlay(Shapes()), Composer()
@@ -435,12 +436,12 @@ def test_text_shows_and_is_made_anew_only_when_it_changes():
 
 
 def test_text_is_light_on_a_dark_panel_in_columns(monkeypatch):
-    from vr_plugin import text_overlay
-    from vr_plugin.text_overlay import INK, PANEL, text_panel
+    from vr_plugin import lettering
+    from vr_plugin.lettering import INK, PANEL, text_panel
 
-    for fonts in (text_overlay.FONTS, ()):  # those of the system, and what Pillow brings itself
-        monkeypatch.setattr(text_overlay, "FONTS", fonts)
-        text_overlay._font.cache_clear()
+    for fonts in (lettering.FONTS, ()):  # those of the system, and what Pillow brings itself
+        monkeypatch.setattr(lettering, "FONTS", fonts)
+        lettering._font.cache_clear()
         panel = text_panel("Hz 62.4\n|", 20)
         assert panel.dtype == np.float32
         assert panel[..., 3].min() == pytest.approx(PANEL[3]) and panel[..., 3].max() == pytest.approx(1)
@@ -451,7 +452,7 @@ def test_text_is_light_on_a_dark_panel_in_columns(monkeypatch):
         # The fifth character stands in the same column, whatever stands before it.
         columns = [np.flatnonzero(text_panel(text, 20)[..., 0].max(0) > 0.5) for text in ("iiii|", "WWWW|")]
         assert columns[0].max() == pytest.approx(columns[1].max(), abs=1)
-    text_overlay._font.cache_clear()
+    lettering._font.cache_clear()
 
 
 def test_text_in_half_a_window_is_half_as_wide():
