@@ -183,3 +183,9 @@ BYTE = 1
 # A picture on its own wall: interpolated positions are off by 2⁻²² of the picture's width, and a rasteriser's
 # bilinear weights have 8 bits of a texel, times the difference of neighbours.
 ON_ITS_WALL = 1 / 256
+
+# --- The preview -------------------------------------------------------------------------------------------
+
+# Mean of a picture of 192 × 144 pixels, sRGB 0 … 1. OpenGL blends the soft rims of lines and letters in
+# linear light, Pillow in sRGB, where half of white is 0.22 darker; rims are some 7 % of so small a picture.
+ROOM_LINES = 0.015

@@ -1,0 +1,229 @@
+"""`persp-sw view`: look around a volume in a window, in stereo, and at a room of walls from outside."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import click
+import numpy as np
+
+from persp_sw.commands.options import (
+    NAMES,
+    json_option,
+    open_scene,
+    region_options,
+    say_missing_voxels,
+    setting_options,
+    tf_option,
+    volume_options,
+)
+from persp_sw.commands.output import numbers, print_facts, print_json, progress_bars
+
+from ..rig import STEREO_MODES
+
+if TYPE_CHECKING:
+    from ..preview_run import Run
+
+_EPILOG = """\b
+Examples:
+  persp-sw view head.nrrd
+  persp-sw view scene.toml --stereo anaglyph
+  persp-sw view head.nrrd --rig configs/cave4.toml --path walk.csv.gz --outside
+  persp-sw view head.nrrd --offscreen --frames 36 --turn 10 -o pictures
+
+\b
+H or F1 in the window lists all keys: drag to orbit, wheel to zoom, F to fly with
+W A S D, 1 to 8 for stereo, Tab for the room from outside, P for a picture on disk,
+Esc to leave.
+"""
+_PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("scene", type=click.Path())
+@click.option("--size", type=int, nargs=2, metavar="W H", help="Window size in pixels. [default: 960 720]")
+@click.option(
+    "--stereo",
+    type=click.Choice(STEREO_MODES),
+    default="mono",
+    show_default=True,
+    help="Stereo mode to start with.",
+)
+@click.option(
+    "--rig", "rig_file", type=click.Path(), help="Room of the outside view; by default a four-wall CAVE."
+)
+@click.option("--outside", is_flag=True, help="Start with the room from outside.")
+@click.option(
+    "--path", "recording", type=click.Path(), help="Recorded head path in the room, .csv or .csv.gz."
+)
+@click.option(
+    "--warp",
+    type=click.Choice(["auto", "texture", "software"]),
+    default="auto",
+    show_default=True,
+    help="Who draws the eye images: OpenGL or the processor.",
+)
+@click.option("--offscreen", is_flag=True, help="No window: write frames into the folder of -o.")
+@click.option("--frames", type=int, metavar="N", help="Leave after N frames; offscreen 1 by default.")
+@click.option("--press", "keys_pressed", metavar="KEYS", help="Press keys at the start, as 'TAB 8 O'.")
+@click.option(
+    "--turn", type=float, default=0.0, metavar="DEGREES", help="Orbit by so much from frame to frame."
+)
+@click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="Folder for pictures.")
+@tf_option
+@setting_options
+@region_options
+@volume_options
+@json_option
+def view(
+    scene: str,
+    size: tuple[int, int] | None,
+    stereo: str,
+    rig_file: str | None,
+    outside: bool,
+    recording: str | None,
+    warp: str,
+    offscreen: bool,
+    frames: int | None,
+    keys_pressed: str | None,
+    turn: float,
+    out: str,
+    quality: float,
+    samples: str | None,
+    residual: float,
+    threads: int | None,
+    as_json: bool,
+    **keys: Any,
+) -> None:
+    """Look around SCENE, a scene file or any volume file, in a window, in mono or stereo.
+
+    Tab shows a room of walls, such as a CAVE, from outside: the pictures on its walls as the tracked head
+    sees them, the head, its eyes, and the volume.
+    """
+    import persp_sw as psw
+
+    from ..preview_run import FRAME_SECONDS, run_offscreen
+    from ..preview_session import PreviewError, folder_for, open_preview, press
+
+    if not offscreen:
+        check_display()
+    if frames is not None and frames < 1:
+        raise PreviewError(f"--frames is at least 1; given {frames}")
+    folder = folder_for(out)
+    with progress_bars() as progress:
+        chosen = open_scene(scene, progress, **keys)
+        settings = psw.Settings(
+            quality=quality,
+            samples_per_interval=int(samples) if samples else chosen.samples_per_interval,
+            residual=residual,
+            threads=threads,
+        )
+        preview, pictures = open_preview(
+            chosen,
+            settings,
+            size=size,
+            stereo=stereo,
+            rig_file=rig_file,
+            recording=recording,
+            presets=NAMES,
+            progress=progress,
+        )
+        press(preview, "TAB " * outside + (keys_pressed or ""))
+        with patience():
+            first = pictures.composite(preview.advance(-FRAME_SECONDS))
+        say_missing_voxels(chosen.volume)
+        if offscreen:
+            done = run_offscreen(
+                preview,
+                pictures,
+                frames=frames or 1,
+                folder=folder,
+                name=chosen.name,
+                turn=np.radians(turn),
+                warp=warp,
+                progress=progress,
+            )
+    if not offscreen:
+        from ..preview_window import run_window
+
+        done = run_window(
+            preview,
+            pictures,
+            frames=frames,
+            folder=folder,
+            name=chosen.name,
+            turn=np.radians(turn),
+            warp=warp,
+        )
+    values = report(done, chosen.name, first.statistics)
+    if as_json:
+        print_json(values)
+    else:
+        _print(values)
+
+
+def check_display() -> None:
+    """PreviewError where there is no screen to open a window on."""
+    from ..preview_session import PreviewError
+
+    screens = ("DISPLAY", "WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in screens):
+        raise PreviewError(
+            "there is no screen for a window (neither DISPLAY nor WAYLAND_DISPLAY is set): write a picture "
+            "with `persp-sw render`, or frames of this preview with --offscreen"
+        )
+
+
+@contextmanager
+def patience() -> Iterator[None]:
+    """Say on stderr what a user waits for, if it takes long."""
+    what = "preparing the first picture; a first start also compiles"
+    timer = threading.Timer(_PATIENCE_SECONDS, lambda: click.echo(what, err=True))
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def report(done: Run, name: str, first: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of --json: medians over all frames but the first, and the last one's counts."""
+    rows = done.frames
+    timed = rows[1:] or rows
+    times = (
+        {key: median(row[key] for row in timed) for key in ("ms", "composite_ms", "warp_ms")} if timed else {}
+    )
+    last = (
+        {} if not rows else {key: value for key, value in rows[-1].items() if key not in (*times, "picture")}
+    )
+    return {
+        "name": name,
+        "frames": len(rows),
+        **last,
+        **times,
+        "encode_ms": first["encode_ms"],
+        "compile_ms": first["compile_ms"],
+        "pictures": [row["picture"] for row in rows if "picture" in row],
+        "screenshots": done.screenshots,
+    }
+
+
+def _print(values: dict[str, Any]) -> None:
+    if not values["frames"]:
+        return
+    facts = {
+        "frames": f"{values['frames']}, median {values['ms']:.1f} ms (composite "
+        f"{values['composite_ms']:.1f}, {values['warp']} warp {values['warp_ms']:.1f})",
+        "eye images": f"{values['compositings']} a frame, {numbers(values['intermediate_size'])} pixels, "
+        f"{values['samples']:,} samples",
+    }
+    files = values["pictures"] + values["screenshots"]
+    if files:
+        facts["pictures"] = files[0] if len(files) == 1 else f"{files[0]} … {files[-1]}, {len(files)} of them"
+    print_facts(facts)
