@@ -143,7 +143,7 @@ def test_the_wheel_sets_the_speed_of_flights(driver: Driver):
 
 
 def test_a_key_held_down_acts_once_and_losing_the_keyboard_lets_go(driver: Driver):
-    for _ in range(5):
+    for _ in range(4):
         driver.preview.key("O", True)
     assert not driver.wait(0.0).overlay
     driver.preview.key("RIGHT", True)
@@ -185,7 +185,10 @@ def test_quad_buffers_that_are_not_there_are_said_and_mono_is_shown(driver: Driv
     wanted = driver.press("4")
     assert wanted.stereo.shown_mode == "mono"
     assert "quad" in wanted.message
-    assert driver.wait(6.0).message == ""
+    while wanted.message:
+        wanted = driver.wait(0.0)
+    assert wanted.moving  # or the line would stay on the screen
+    assert driver.now < 110
     assert driver.press("N").stereo.mode == "side_by_side"  # the one after quad
 
 

@@ -295,7 +295,9 @@ def test_events_of_a_window_reach_the_controller(opened: tuple):
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("keys", ["", "5", "6", "7", "8 X", "TAB", "TAB 8", "TAB V 5", "H", "2", "4"])
+@pytest.mark.parametrize(
+    "keys", ["", "5", "6", "7", "8 X", "TAB", "TAB 8", "TAB V 5", "H", "2", "4", "TAB V R"]
+)
 def test_opengl_draws_what_the_processor_draws(gl_context: psw.OffscreenContext, scene: psw.Scene, keys: str):
     """But for smooth edges of lines and letters, and a filter of walls."""
     from vr_plugin.preview_run import _TextureFrames
@@ -303,6 +305,7 @@ def test_opengl_draws_what_the_processor_draws(gl_context: psw.OffscreenContext,
     size = (192, 144)
     preview, pictures = open_preview(scene, psw.Settings(), size=size)
     press(preview, keys + ("" if "H" in keys else " O"))
+    preview.orbit(1.3 if keys == "TAB V R" else 0.0)  # a wall is seen from behind
     wanted, rate = preview.advance(0.0), Rate()
     software, _ = software_frame(pictures, wanted, rate)
     texture, figures = _TextureFrames(pictures)(pictures, wanted, rate)
@@ -367,6 +370,14 @@ def test_a_recorded_head_moves_from_frame_to_frame(ball_file: Path, tmp_path: Pa
     press(preview, "TAB")
     preview.advance(0.0)
     np.testing.assert_allclose(preview.advance(10 / 60).head.position, (1.0, 1.7, 1.0), atol=1e-9)
+    # In cave4 the tracker is turned by 180° about y, then shifted.
+    rig = ROOT / "configs" / "cave4.toml"
+    preview, _ = open_preview(scene, psw.Settings(), size=SIZE, rig_file=rig, recording=path)
+    press(preview, "TAB")
+    preview.advance(0.0)
+    np.testing.assert_allclose(
+        preview.advance(10 / 60).head.position, (-1.0 - 0.06, 1.7 + 0.95, -1.0 + 1.0), atol=1e-9
+    )
 
 
 @pytest.mark.parametrize(
