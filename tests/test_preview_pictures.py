@@ -124,6 +124,16 @@ def test_from_outside_every_eye_is_composited_once_and_the_volume_once(opened: t
     assert drawn(opened, "V")[1].statistics["compositings"] == 2
 
 
+def test_a_head_mounted_displays_walls_stay_their_eyes(scene: psw.Scene):
+    rig = ROOT / "configs" / "hmd.toml"
+    opened = open_preview(scene, psw.Settings(), size=SIZE, rig_file=rig)
+    for keys in ("TAB", "8", "M"):
+        _, done, _ = drawn(opened, keys)
+        eyes = {picture.wall.name: picture.eye for picture in done.inside.pictures}
+        assert eyes == {wall.name: wall.stereo for wall in opened[0].rig.walls}
+        assert sorted(eyes.values()) == ["left", "right"]
+
+
 def test_walls_show_what_the_head_sees(opened: tuple, scene: psw.Scene):
     """A pixel of the room's picture is the pixel of the wall that its ray hits."""
     preview, pictures = opened

@@ -98,7 +98,11 @@ class PreviewPictures:
         mode = wanted.stereo.shown_mode
         visitor = None
         if wanted.outside:
-            modes = {wall.name: mode for wall in self._room.walls}
+            # A wall for one eye, as in a head-mounted display, stays that eye's.
+            one_eye = {
+                wall.name: wall.stereo for wall in self._room.walls if wall.stereo in ("left", "right")
+            }
+            modes = dict.fromkeys((wall.name for wall in self._room.walls), mode) | one_eye
             frame = self._room.make(wanted.head, wanted.head_eyes, self.rig.eyes.near, modes)
             if wanted.volume_outside:
                 self._visitor.walls = (RigWall(wanted.camera.wall(wanted.size)),)
@@ -163,9 +167,10 @@ class PreviewPictures:
         mode = wanted.stereo.shown_mode
         own = {p.eye: p for p in done.inside.pictures if p.wall.name == name}
         drawn = {eye: self.warp(f"{name} {eye}", p.image, p.view) for eye, p in own.items()}
+        if len(drawn) == 1:
+            (only,) = drawn.values()
+            return encoded(only[..., :3] + (1 - only[..., 3:]) * self.background)
         left, right = (drawn[eye] for eye in wanted.stereo.channels)
-        if len(own) == 1:
-            return encoded(left[..., :3] + (1 - left[..., 3:]) * self.background)
         return encoded(combine(left, right, mode, background=self.background)[..., :3])
 
     def warp(self, slot: str, image: psw.EyeImage, view: psw.View) -> NDArray[np.float32]:

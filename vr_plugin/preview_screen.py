@@ -141,17 +141,15 @@ class PreviewScreen:
         for name in dict.fromkeys(picture.wall.name for picture in done.inside.pictures):
             own = [picture for picture in done.inside.pictures if picture.wall.name == name]
             eyes = self._draw_eyes(own, f"wall {name}")
-            left, right = (eyes[channel] for channel in wanted.stereo.channels)
+            mode = wanted.stereo.shown_mode if len(eyes) == 2 else "mono"
+            (left, right) = (
+                (eyes[c] for c in wanted.stereo.channels) if len(eyes) == 2 else 2 * [*eyes.values()]
+            )
             size = own[0].view.size
             walls[name] = wall = self._target(f"wall {name}", size)
             with wall.drawing():
                 self._composer.compose(
-                    left,
-                    right,
-                    wanted.stereo.shown_mode,
-                    size,
-                    background=self.pictures.background,
-                    encode=False,
+                    left, right, mode, size, background=self.pictures.background, encode=False
                 )
             wall.make_mipmaps()
         room = self._target("room", wanted.size)
