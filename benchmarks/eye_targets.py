@@ -1,4 +1,4 @@
-"""What an eye's picture should be drawn in: time and error of the formats of `vr_plugin.eye_target`.
+"""What an eye's picture should be drawn in: time and error of the formats of `vr_plugin.screen.eye_target`.
 
     python benchmarks/eye_targets.py [--size 1024] [--frames 20]
 
@@ -41,10 +41,10 @@ def main() -> None:
     with psw.OffscreenContext() as context:
         from OpenGL import GL
 
-        from vr_plugin.eye_target import FORMATS, EyeTarget
-        from vr_plugin.gl_objects import Texture
         from vr_plugin.present import Composer, read_screen
-        from vr_plugin.shapes import Shapes
+        from vr_plugin.screen.eye_target import FORMATS, EyeTarget
+        from vr_plugin.screen.gl_objects import Texture
+        from vr_plugin.screen.shapes import Shapes
 
         print(f"{context.renderer}, {size[0]} × {size[1]} pixels, median of {options.frames}")
         shapes, composer = Shapes(), Composer()

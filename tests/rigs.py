@@ -6,7 +6,7 @@ from pathlib import Path
 
 from samples import ROOT
 
-from vr_plugin.rig_file import rig_of_keys
+from vr_plugin.rigs.file import rig_of_keys
 
 CONFIGS = ROOT / "configs"
 

@@ -10,7 +10,7 @@ from tolerances import MATRIX, ROUNDING
 
 import persp_sw as psw
 from vr_plugin.cameras import STEEPEST, Camera, CameraError
-from vr_plugin.navigation import (
+from vr_plugin.preview.navigation import (
     DISTANCES,
     ORBIT_PER_HEIGHT,
     SPEED_PER_NOTCH,

@@ -15,7 +15,7 @@ import persp_sw as psw
 from vr_plugin.commands.cave import cave
 from vr_plugin.loop import Loop
 from vr_plugin.pose import Pose
-from vr_plugin.rig_file import load_rig
+from vr_plugin.rigs.file import load_rig
 from vr_plugin.trackers import Sample
 
 RIG = """

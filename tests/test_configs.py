@@ -14,12 +14,12 @@ import persp_sw as psw
 from persp_sw.measure.metrics import psnr
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.frame import FrameMaker
-from vr_plugin.one_machine import rig_on_machine
 from vr_plugin.placement import corners_in_room, room_from_world
 from vr_plugin.pose import Pose
 from vr_plugin.rig import Rig, TrackerPlace
-from vr_plugin.rig_check import findings
-from vr_plugin.rig_file import load_rig, rig_to_toml
+from vr_plugin.rigs.check import findings
+from vr_plugin.rigs.file import load_rig, rig_to_toml
+from vr_plugin.rigs.one_machine import rig_on_machine
 
 # Walls that see some of the volume from where the head rests.
 SEEN_BY = {

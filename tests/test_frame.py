@@ -10,12 +10,12 @@ import pytest
 import persp_sw as psw
 from persp_sw import compositor
 from persp_sw.volume.phantoms import synthetic_ct
+from vr_plugin.cave.wall_pictures import SoftwareDrawer, TextureDrawer
 from vr_plugin.eyes import EyePair, before_wall, eyes_of_head
 from vr_plugin.frame import FrameMaker
 from vr_plugin.placement import room_from_world
 from vr_plugin.pose import Pose, turn_about
 from vr_plugin.rig import Eyes, Rig, RigError, RigWall
-from vr_plugin.wall_pictures import SoftwareDrawer, TextureDrawer
 
 # Rays of two walls through one point differ by rounding alone: a few 1e-16 of the distance, magnified by
 # pixels a voxel and voxels a grey level. OpenGL finds them in float32: 6e-8 · 40 pixels, 0.1 a pixel steep.

@@ -10,7 +10,7 @@ from views import random_pose
 
 import persp_sw as psw
 from vr_plugin.placement import corners_in_room, room_from_world
-from vr_plugin.similarity import flaw_of
+from vr_plugin.rigs.similarity import flaw_of
 
 
 def volume_of(pose=None, size=(5, 9, 17), **others) -> psw.Volume:

@@ -47,7 +47,7 @@ def pictures(rng: np.random.Generator, size: tuple[int, int]) -> np.ndarray:
 
 
 def targets(both: np.ndarray, precision: str = "float32") -> list:
-    from vr_plugin.eye_target import EyeTarget
+    from vr_plugin.screen.eye_target import EyeTarget
 
     made = [EyeTarget(both.shape[2:0:-1], precision) for _ in both]
     for target, picture in zip(made, both, strict=True):
@@ -174,9 +174,9 @@ def test_two_windows_are_composed_one_by_one(rng):
 @pytest.mark.parametrize("precision", ["float16", "float32", "srgb8"])
 def test_light_adds_up_before_it_is_encoded(precision):
     """0.25 with opacity 0.5 over 0.5 is 0.5, which is 188 of 255; blended as bytes it would be 128."""
-    from vr_plugin.eye_target import EyeTarget
     from vr_plugin.present import Composer, read_screen
-    from vr_plugin.shapes import Shapes
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
 
     target, shapes = EyeTarget((8, 8), precision), Shapes()
     with target.drawing():
@@ -200,8 +200,8 @@ def test_pictures_go_in_and_out_upright(precision, tolerance, rng):
 
 
 def test_an_srgb_target_is_read_as_light():
-    from vr_plugin.eye_target import EyeTarget
-    from vr_plugin.shapes import Shapes
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
 
     target = EyeTarget((4, 4), "srgb8")
     with target.drawing():
@@ -216,8 +216,8 @@ def test_an_srgb_target_is_read_as_light():
 def test_a_target_begins_empty_and_far():
     from OpenGL import GL
 
-    from vr_plugin.eye_target import EyeTarget
-    from vr_plugin.shapes import Shapes
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
 
     target, shapes = EyeTarget((6, 6)), Shapes()
     far = np.array(WHOLE, float) + (0, 0, 0.9)
@@ -242,7 +242,7 @@ def test_a_target_takes_another_size(rng):
 
 
 def test_targets_refuse_what_cannot_be():
-    from vr_plugin.eye_target import EyeTarget
+    from vr_plugin.screen.eye_target import EyeTarget
 
     with pytest.raises(GraphicsError, match="choose one of float16, float32, srgb8"):
         EyeTarget((8, 8), "rgba4")
@@ -255,7 +255,7 @@ def test_targets_refuse_what_cannot_be():
 
 
 def test_a_bad_shader_is_told_in_the_drivers_words():
-    from vr_plugin.gl_objects import Program
+    from vr_plugin.screen.gl_objects import Program
 
     with pytest.raises(GraphicsError, match=r"does not compile: .*nonsense"):
         Program("void main() { nonsense; }", "void main() {}")
@@ -266,8 +266,8 @@ def test_a_bad_shader_is_told_in_the_drivers_words():
 
 def drawn(size: tuple[int, int], draw) -> np.ndarray:
     """What `draw(shapes)` draws into a target of floats."""
-    from vr_plugin.eye_target import EyeTarget
-    from vr_plugin.shapes import Shapes
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
 
     target, shapes = EyeTarget(size, "float32"), Shapes()
     with target.drawing():
@@ -276,7 +276,7 @@ def drawn(size: tuple[int, int], draw) -> np.ndarray:
 
 
 def test_a_line_covers_its_width():
-    from vr_plugin.shapes import clip_from_pixels
+    from vr_plugin.screen.shapes import clip_from_pixels
 
     size = (20, 12)
     segments = [[(4, 5, 0), (16, 5, 0)]]
@@ -287,7 +287,7 @@ def test_a_line_covers_its_width():
 
 
 def test_a_slanted_line_has_smooth_edges_and_the_right_weight():
-    from vr_plugin.shapes import clip_from_pixels
+    from vr_plugin.screen.shapes import clip_from_pixels
 
     size = (100, 100)
     segments = [[(10, 20, 0), (90, 70, 0)]]
@@ -400,11 +400,11 @@ def test_nothing_to_draw_is_no_error():
 
 
 def test_text_shows_and_is_made_anew_only_when_it_changes():
-    from vr_plugin.eye_target import EyeTarget
-    from vr_plugin.lettering import text_panel
     from vr_plugin.present import Composer, read_screen
-    from vr_plugin.shapes import Shapes
-    from vr_plugin.text_overlay import Overlay
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.lettering import text_panel
+    from vr_plugin.screen.shapes import Shapes
+    from vr_plugin.screen.text_overlay import Overlay
 
     size = (240, 120)
     target, overlay, composer = EyeTarget(size), Overlay(Shapes()), Composer()
@@ -436,8 +436,8 @@ def test_text_shows_and_is_made_anew_only_when_it_changes():
 
 
 def test_text_is_light_on_a_dark_panel_in_columns(monkeypatch):
-    from vr_plugin import lettering
-    from vr_plugin.lettering import INK, PANEL, text_panel
+    from vr_plugin.screen import lettering
+    from vr_plugin.screen.lettering import INK, PANEL, text_panel
 
     for fonts in (lettering.FONTS, ()):  # those of the system, and what Pillow brings itself
         monkeypatch.setattr(lettering, "FONTS", fonts)
@@ -456,9 +456,9 @@ def test_text_is_light_on_a_dark_panel_in_columns(monkeypatch):
 
 
 def test_text_in_half_a_window_is_half_as_wide():
-    from vr_plugin.eye_target import EyeTarget
-    from vr_plugin.shapes import Shapes
-    from vr_plugin.text_overlay import Overlay
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
+    from vr_plugin.screen.text_overlay import Overlay
 
     overlay = Overlay(Shapes())
     covered = {}
@@ -493,10 +493,10 @@ def state() -> dict[str, object]:
 
 def everything() -> None:
     """Draw all there is to draw, and delete it."""
-    from vr_plugin.eye_target import EyeTarget
     from vr_plugin.present import Composer, read_screen
-    from vr_plugin.shapes import Shapes
-    from vr_plugin.text_overlay import Overlay
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
+    from vr_plugin.screen.text_overlay import Overlay
 
     shapes, composer = Shapes(), Composer()
     overlay, pair = Overlay(shapes), [EyeTarget((24, 16)), EyeTarget((24, 16))]
@@ -521,7 +521,7 @@ def everything() -> None:
 def test_state_is_left_as_it_was():
     from OpenGL import GL
 
-    from vr_plugin.gl_objects import Program, Texture
+    from vr_plugin.screen.gl_objects import Program, Texture
 
     floats((32, 32))
     before = state()

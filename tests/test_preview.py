@@ -9,18 +9,18 @@ import pytest
 from tolerances import MATRIX
 
 import persp_sw as psw
-from vr_plugin import navigation
 from vr_plugin.cameras import Camera
-from vr_plugin.figures import Rate, figures, fitting_letter, help_text
-from vr_plugin.keys import BINDINGS, KEYS, SPIN_KEYS, THRUST_KEYS
-from vr_plugin.outside import room_camera
 from vr_plugin.pose import Pose
-from vr_plugin.preview import FAST, HEAD_SPEED, Preview
-from vr_plugin.preview_choices import QUALITIES, QUALITY_STEP, SEPARATION, SEPARATION_STEP, Choices
-from vr_plugin.preview_session import PreviewError, press
+from vr_plugin.preview import navigation
+from vr_plugin.preview.choices import QUALITIES, QUALITY_STEP, SEPARATION, SEPARATION_STEP, Choices
+from vr_plugin.preview.controller import FAST, HEAD_SPEED, Preview
+from vr_plugin.preview.figures import Rate, figures, fitting_letter, help_text
+from vr_plugin.preview.keys import BINDINGS, KEYS, SPIN_KEYS, THRUST_KEYS
+from vr_plugin.preview.session import PreviewError, press
+from vr_plugin.preview.wanted import Wanted
 from vr_plugin.rig import STEREO_MODES
-from vr_plugin.rooms import four_walls
-from vr_plugin.wanted import Wanted
+from vr_plugin.room.outside import room_camera
+from vr_plugin.room.rooms import four_walls
 
 UP = np.array([0.0, 0.0, 1.0])
 SIZE = (400, 200)
@@ -357,7 +357,7 @@ def test_every_key_means_one_thing_and_the_help_tells_it():
 
 @pytest.mark.parametrize("size", [(960, 720), (400, 300), (3840, 2160)])
 def test_the_help_fits_the_window(size: tuple):
-    from vr_plugin.lettering import text_panel
+    from vr_plugin.screen.lettering import text_panel
 
     letter = fitting_letter(help_text(), size)
     height, width, _ = text_panel(help_text(), letter).shape

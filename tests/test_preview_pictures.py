@@ -12,19 +12,19 @@ from tolerances import FLOAT32_IMAGE, ROOM_LINES
 
 import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
-from vr_plugin import outside
 from vr_plugin.cameras import Camera
-from vr_plugin.events import Button, Closing, Focus, Key, Pointer, Resized, Wheel
-from vr_plugin.figures import Rate
-from vr_plugin.lettering import lay_over, squeezed, text_panel
 from vr_plugin.pose import Pose
-from vr_plugin.preview import Preview
-from vr_plugin.preview_pictures import PreviewPictures
-from vr_plugin.preview_run import lay_texts, run_offscreen, software_frame
-from vr_plugin.preview_session import open_preview, press
-from vr_plugin.rig_file import load_rig
-from vr_plugin.room_painter import BACKGROUND, RoomPainter, encoded
-from vr_plugin.rooms import four_walls
+from vr_plugin.preview.controller import Preview
+from vr_plugin.preview.figures import Rate
+from vr_plugin.preview.pictures import PreviewPictures
+from vr_plugin.preview.run import lay_texts, run_offscreen, software_frame
+from vr_plugin.preview.session import open_preview, press
+from vr_plugin.rigs.file import load_rig
+from vr_plugin.room import outside
+from vr_plugin.room.painter import BACKGROUND, RoomPainter, encoded
+from vr_plugin.room.rooms import four_walls
+from vr_plugin.screen.events import Button, Closing, Focus, Key, Pointer, Resized, Wheel
+from vr_plugin.screen.lettering import lay_over, squeezed, text_panel
 
 SIZE = (96, 64)
 ROOT = Path(__file__).resolve().parent.parent
@@ -276,7 +276,7 @@ def test_a_text_is_squeezed_as_the_display_stretches_it(opened: tuple):
 
 
 def test_events_of_a_window_reach_the_controller(opened: tuple):
-    from vr_plugin.preview_window import feed
+    from vr_plugin.preview.in_window import feed
 
     preview, _ = opened
     home = preview.advance(0.0).camera
@@ -310,7 +310,7 @@ def test_events_of_a_window_reach_the_controller(opened: tuple):
 )
 def test_opengl_draws_what_the_processor_draws(gl_context: psw.OffscreenContext, scene: psw.Scene, keys: str):
     """But for smooth edges of lines and letters, and a filter of walls."""
-    from vr_plugin.preview_run import _TextureFrames
+    from vr_plugin.preview.run import _TextureFrames
 
     size = (192, 144)
     preview, pictures = open_preview(scene, psw.Settings(), size=size)

@@ -18,7 +18,7 @@ from samples import ROOT
 from virtual_screen import SECONDS, Program, display, environment  # noqa: F401  (a fixture)
 
 from persp_sw.volume.phantoms import synthetic_ct
-from vr_plugin.room_painter import BACKGROUND
+from vr_plugin.room.painter import BACKGROUND
 
 pytestmark = pytest.mark.gl
 

@@ -11,7 +11,7 @@ from views import random_pose, random_rotation
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.pose import Pose, quaternion_of
 from vr_plugin.rig import TrackerPlace
-from vr_plugin.similarity import flaw_of, parts_of, similarity
+from vr_plugin.rigs.similarity import flaw_of, parts_of, similarity
 
 
 def test_a_wall_of_the_room_stays_and_one_of_the_head_goes_with_it(rng):

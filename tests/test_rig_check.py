@@ -7,9 +7,9 @@ import math
 import pytest
 from rigs import rig_of, wall_keys
 
-from vr_plugin.one_machine import rig_on_machine
 from vr_plugin.rig import RigError
-from vr_plugin.rig_check import WallMeasures, findings
+from vr_plugin.rigs.check import WallMeasures, findings
+from vr_plugin.rigs.one_machine import rig_on_machine
 
 GOOD = wall_keys()
 

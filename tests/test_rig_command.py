@@ -15,7 +15,7 @@ from rigs import CONFIGS, wall_keys
 
 from persp_sw.cli import main
 from vr_plugin.commands import rig as rig_command
-from vr_plugin.rig_file import rig_of_keys, rig_to_toml
+from vr_plugin.rigs.file import rig_of_keys, rig_to_toml
 
 CAVE = CONFIGS / "cave4.toml"
 

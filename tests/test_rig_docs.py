@@ -8,10 +8,10 @@ import pytest
 from pydantic import BaseModel
 from samples import ROOT
 
-from vr_plugin.problems import _models
 from vr_plugin.rig import STEREO_MODES, TRACKER_KINDS
-from vr_plugin.rig_file import load_rig
-from vr_plugin.rig_schema import RigKeys
+from vr_plugin.rigs.file import load_rig
+from vr_plugin.rigs.problems import _models
+from vr_plugin.rigs.schema import RigKeys
 
 TEXT = (ROOT / "docs" / "rig-files.md").read_text()
 SNIPPETS = re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL)

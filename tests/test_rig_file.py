@@ -12,8 +12,8 @@ from views import random_rotation
 
 from vr_plugin.pose import Pose, quaternion_of
 from vr_plugin.rig import Eyes, Placement, QualityAim, Rig, RigError, RigWall, TrackerPlace, WindowPlace
-from vr_plugin.rig_check import findings
-from vr_plugin.rig_file import load_rig, rig_of_keys, rig_to_toml
+from vr_plugin.rigs.check import findings
+from vr_plugin.rigs.file import load_rig, rig_of_keys, rig_to_toml
 
 try:
     from tomllib import loads as _toml

@@ -15,8 +15,8 @@ from persp_sw.errors import PerspSWError
 from vr_plugin.commands.rig_convert import convert
 from vr_plugin.formats import import_rig
 from vr_plugin.rig import Rig, RigError
-from vr_plugin.rig_file import load_rig
-from vr_plugin.rig_text import rig_to_toml
+from vr_plugin.rigs.file import load_rig
+from vr_plugin.rigs.text import rig_to_toml
 
 
 def corners(rig: Rig, name: str) -> np.ndarray:

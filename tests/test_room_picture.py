@@ -7,15 +7,15 @@ import pytest
 from rigs import CONFIGS, rig_of, wall_keys
 
 import persp_sw as psw
-from vr_plugin import drawing
-from vr_plugin.drawing import Sheet
 from vr_plugin.placement import room_from_world
-from vr_plugin.rig_file import load_rig
-from vr_plugin.room_facts import WARNING
-from vr_plugin.room_picture import SIZE, draw_room
-from vr_plugin.room_plan import _Plan
-from vr_plugin.room_scene import EDGES, RoomScene, between_walls
-from vr_plugin.room_view import _View
+from vr_plugin.rigs.file import load_rig
+from vr_plugin.room import drawing
+from vr_plugin.room.drawing import Sheet
+from vr_plugin.room.facts import WARNING
+from vr_plugin.room.picture import SIZE, draw_room
+from vr_plugin.room.plan import _Plan
+from vr_plugin.room.scene import EDGES, RoomScene, between_walls
+from vr_plugin.room.view import _View
 
 AREA = (20, 30, 620, 430)
 ALL = sorted(path.stem for path in CONFIGS.glob("*.toml"))

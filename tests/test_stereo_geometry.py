@@ -7,11 +7,11 @@ import pytest
 from test_frame import cave
 
 import persp_sw as psw
+from vr_plugin.cave.wall_pictures import SoftwareDrawer, TextureDrawer
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.frame import FrameMaker
 from vr_plugin.pose import Pose, turn_about
 from vr_plugin.rig import Eyes
-from vr_plugin.wall_pictures import SoftwareDrawer, TextureDrawer
 
 # The centroid of a bright voxel's footprint: its tent is symmetric along the ray's planes but for perspective
 # across one voxel, 1/64 of the depth here, of a footprint of some 5 pixels; the bilinear look-up of the eye

@@ -9,7 +9,7 @@ import pytest
 from virtual_screen import SCREEN, Program, display  # noqa: F401  (a fixture)
 
 import persp_sw as psw
-from vr_plugin.monitors import Monitors
+from vr_plugin.screen.monitors import Monitors
 from vr_plugin.stereo import shows_left
 from vr_plugin.window import Window
 
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.gl
 
 HEAD = """
 from window_program import flat, run, say, settle, tell
-from vr_plugin.monitors import WindowError
+from vr_plugin.screen.monitors import WindowError
 from vr_plugin.rig import WindowPlace
 from vr_plugin.window import Windows
 """
@@ -418,7 +418,7 @@ with Windows() as windows:
     Composer().compose(target, target, "mono", window.size)
     say(read_screen((1, 1))[0, 0].tolist())
     import numpy as np
-    from vr_plugin.shapes import Shapes
+    from vr_plugin.screen.shapes import Shapes
     Shapes().polygon(np.eye(4), [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], (1, 1, 0), hidden=False)
     say(read_screen((1, 1))[0, 0].tolist())
 """

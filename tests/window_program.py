@@ -8,7 +8,7 @@ from time import monotonic
 
 import numpy as np
 
-from vr_plugin.events import Event, asks_to_end
+from vr_plugin.screen.events import Event, asks_to_end
 from vr_plugin.window import Windows
 
 
@@ -46,7 +46,7 @@ def settle(windows: Windows, done, seconds: float = 20.0) -> list[Event]:
 
 def flat(colour: tuple[float, float, float], size: tuple[int, int]):
     """An eye target of one linear opaque colour."""
-    from vr_plugin.eye_target import EyeTarget
+    from vr_plugin.screen.eye_target import EyeTarget
 
     target = EyeTarget(size, "float32")
     target.upload(np.broadcast_to(np.float32([*colour, 1]), (size[1], size[0], 4)))

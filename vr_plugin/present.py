@@ -16,8 +16,8 @@ from OpenGL import GL
 
 import persp_sw as psw
 
-from .eye_target import EyeTarget
-from .gl_objects import Program, integer, kept_state, read_pixels
+from .screen.eye_target import EyeTarget
+from .screen.gl_objects import Program, integer, kept_state, read_pixels
 from .stereo import DUBOIS_LEFT, DUBOIS_RIGHT, MODES, Rectangle, StereoError, rectangles, without_quad_buffers
 
 _log = logging.getLogger("persp_sw")

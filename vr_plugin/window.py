@@ -13,10 +13,10 @@ from typing import Any
 
 from persp_sw.errors import MissingPackageError
 
-from .events import Event, MonitorChange
-from .monitors import Monitors, WindowError
 from .rig import WindowPlace
-from .window_input import listen
+from .screen.events import Event, MonitorChange
+from .screen.monitors import Monitors, WindowError
+from .screen.window_input import listen
 
 _NO_SCREEN = (
     "start it in a desktop session or give DISPLAY; without a screen, use --offscreen, or a virtual one: "

@@ -13,7 +13,7 @@ from persp_sw.commands.options import json_option, open_scene, setting_options, 
 from persp_sw.commands.output import numbers, print_facts, print_json, progress_bars
 
 if TYPE_CHECKING:
-    from ..cave_offscreen import Costs
+    from ..cave.offscreen import Costs
     from ..frame import Frame
     from ..loop import Loop
     from ..rig import Rig
@@ -85,9 +85,9 @@ def cave(
     """Show SCENE on all walls of RIG, for a tracked viewer, in stereo."""
     import persp_sw as psw
 
+    from ..formats.opening import open_rig
     from ..loop import Loop
-    from ..one_machine import rig_on_machine
-    from ..rig_open import open_rig
+    from ..rigs.one_machine import rig_on_machine
     from ..trackers import open_tracker
 
     chosen = rig_on_machine(open_rig(rig, unit), machine, offscreen=offscreen)
@@ -113,7 +113,7 @@ def cave(
         loop = Loop(chosen, renderer, tracker)
         try:
             if not offscreen:
-                from ..cave_windows import run_windows
+                from ..cave.windows import run_windows
 
                 progress(1, 1, "starting")
                 values = run_windows(loop, warp, shown.background, frames, Path(scene).name)
@@ -159,9 +159,9 @@ def _offscreen(
 ) -> dict[str, Any]:
     import persp_sw as psw
 
-    from .. import cave_offscreen
-    from ..contact_sheet import contact_sheet
-    from ..wall_pictures import drawer
+    from ..cave import offscreen as cave_offscreen
+    from ..cave.contact_sheet import contact_sheet
+    from ..cave.wall_pictures import drawer
 
     def write(pictures: Any, number: int | None) -> dict[tuple[str, str], str]:
         tag = "" if number is None else f"-{number:05d}"

@@ -13,7 +13,7 @@ import numpy as np
 from persp_sw.commands.options import json_option, open_scene, say_missing_voxels, tf_option, volume_options
 from persp_sw.commands.output import print_facts, print_json, progress_bars
 
-from ..rig_open import open_rig
+from ..formats.opening import open_rig
 from .rig_report import print_rig, values_of
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def show(
     """Draw the room of FILE, a rig file or another system's wall file, as a picture."""
     import persp_sw as psw
 
-    from ..room_picture import draw_room
+    from ..room.picture import draw_room
 
     target = psw.images.check_output(out or f"{Path(file).name.split('.')[0]}-room.png")
     if target.suffix.lower() != ".png":
@@ -155,7 +155,7 @@ def _heads(place: TrackerPlace, path_file: str) -> np.ndarray:
 
 
 def _path_values(opened: Rig, heads: np.ndarray) -> dict[str, Any]:
-    from ..room_scene import between_walls
+    from ..room.scene import between_walls
 
     inside = float(between_walls(heads, opened).mean())
     return {"poses": len(heads), "inside": inside, "low": heads.min(0), "high": heads.max(0)}

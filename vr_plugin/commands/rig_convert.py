@@ -50,7 +50,7 @@ def convert(
 
     FILE is a ParaView .pvx, a COVISE/OpenCOVER or CalVR .xml or a VR Juggler .jconf; its content decides.
     """
-    from ..rig_file import rig_to_toml
+    from ..rigs.file import rig_to_toml
 
     reading = import_rig(file, unit, hosts=hosts, skip_broken=skip_broken, pixels=pixels)
     text = _headed(rig_to_toml(reading.rig), Path(file).name, reading)

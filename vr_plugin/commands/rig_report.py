@@ -11,7 +11,7 @@ import numpy as np
 from persp_sw.commands.output import numbers, print_facts
 
 from ..rig import Rig, RigWall, TrackerPlace, WindowPlace
-from ..rig_check import WallMeasures, findings
+from ..rigs.check import WallMeasures, findings
 
 
 def values_of(opened: Rig) -> dict[str, Any]:

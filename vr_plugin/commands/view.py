@@ -28,7 +28,7 @@ from persp_sw.commands.output import numbers, print_facts, print_json, progress_
 from ..rig import STEREO_MODES
 
 if TYPE_CHECKING:
-    from ..preview_run import Run
+    from ..preview.run import Run
 
 _EPILOG = """\b
 Examples:
@@ -108,8 +108,8 @@ def view(
     """
     import persp_sw as psw
 
-    from ..preview_run import FRAME_SECONDS, run_offscreen
-    from ..preview_session import PreviewError, folder_for, open_preview, press
+    from ..preview.run import FRAME_SECONDS, run_offscreen
+    from ..preview.session import PreviewError, folder_for, open_preview, press
 
     if not offscreen:
         check_display()
@@ -150,7 +150,7 @@ def view(
                 progress=progress,
             )
     if not offscreen:
-        from ..preview_window import run_window
+        from ..preview.in_window import run_window
 
         done = run_window(
             preview,
@@ -170,7 +170,7 @@ def view(
 
 def check_display() -> None:
     """PreviewError where there is no screen to open a window on."""
-    from ..preview_session import PreviewError
+    from ..preview.session import PreviewError
 
     screens = ("DISPLAY", "WAYLAND_DISPLAY")
     if sys.platform.startswith("linux") and not any(os.environ.get(name) for name in screens):

@@ -12,7 +12,7 @@ from persp_sw.errors import PerspSWError
 
 from ..pose import Pose, quaternion_of
 from ..rig import Eyes, Rig, RigError, RigWall, TrackerPlace
-from ..rig_check import LARGEST_WALL, findings
+from ..rigs.check import LARGEST_WALL, findings
 from .draft import Draft, DraftTracker, DraftWall
 from .report import Report, printable
 from .rest import rest_pose

@@ -1,0 +1,1 @@
+"""Runs of a rig: in windows, or without a screen."""

@@ -1,0 +1,1 @@
+"""The desktop preview: cameras, its controller, and what draws it."""

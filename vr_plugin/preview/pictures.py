@@ -1,0 +1,214 @@
+"""The preview's pictures: what its controller wants, composited and, by the software warp, drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import persp_sw as psw
+
+from ..eyes import EyePair
+from ..frame import Frame, FrameMaker
+from ..placement import corners_in_room
+from ..pose import Pose
+from ..rig import Rig, RigWall
+from ..room import outside
+from ..room.painter import RoomPainter, encoded
+from ..stereo import combine, eye_size
+from .wanted import Wanted
+
+WALL_PIXELS = 384  # of a wall's longer side in the view from outside
+
+
+@dataclass(frozen=True, eq=False)
+class Composited:
+    """The eye images of one moment, and what they cost.
+
+    Attributes
+    ----------
+    inside
+        Of the camera's eyes, for the window; of the head's eyes, for the walls, in the view from outside.
+    outside
+        Of the outside camera: the volume itself; None where it is not shown.
+    statistics
+        Of all of them together, as `overlay.figures` needs them but for the warp.
+    """
+
+    inside: Frame
+    outside: Frame | None
+    statistics: Mapping[str, Any]
+
+
+class PreviewPictures:
+    """Makes what a preview wants of one volume.
+
+    Parameters
+    ----------
+    renderer
+        Its quality and transfer function follow what is wanted.
+    transfer_of
+        The transfer function of a preset's name; of None, the scene's own.
+    rig, room_from_world
+        The room of the outside view, and where the volume stands in it.
+    background
+        (3,) linear, behind the volume.
+    near
+        World units before the camera's eyes in which nothing is shown.
+    preset
+        The name that the renderer's transfer function is of.
+
+    Attributes
+    ----------
+    progress
+        Called with (done, total, what) while the volume is encoded.
+    """
+
+    def __init__(
+        self,
+        renderer: psw.Renderer,
+        transfer_of: Callable[[str | None], psw.TransferFunction],
+        *,
+        rig: Rig | None = None,
+        room_from_world: np.ndarray | None = None,
+        background: np.ndarray = (0.0, 0.0, 0.0),
+        near: float = 0.0,
+        preset: str | None = None,
+    ):
+        self.renderer = renderer
+        self.rig = rig
+        self.background = np.asarray(background, np.float64)
+        self.near = near
+        self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
+        self._transfer_of, self._preset = transfer_of, preset
+        self._window = FrameMaker(renderer, (), np.eye(4))
+        self._canvases: dict[str, psw.Canvas] = {}
+        if rig is not None:
+            walls = [replace(wall, wall=_smaller(wall.wall)) for wall in rig.walls]
+            self._room = FrameMaker(renderer, walls, room_from_world)
+            self._visitor = FrameMaker(renderer, (), room_from_world)
+
+    def composite(self, wanted: Wanted) -> Composited:
+        """The eye images for what is wanted; may encode (a new preset) and compile (the first time)."""
+        self._set_up(wanted)
+        mode = wanted.stereo.shown_mode
+        visitor = None
+        if wanted.outside:
+            # A wall for one eye, as in a head-mounted display, stays that eye's.
+            one_eye = {
+                wall.name: wall.stereo for wall in self._room.walls if wall.stereo in ("left", "right")
+            }
+            modes = dict.fromkeys((wall.name for wall in self._room.walls), mode) | one_eye
+            frame = self._room.make(wanted.head, wanted.head_eyes, self.rig.eyes.near, modes)
+            if wanted.volume_outside:
+                self._visitor.walls = (RigWall(wanted.camera.wall(wanted.size)),)
+                visitor = self._visitor.make(Pose(), _one_eye(wanted.camera.position))
+        else:
+            wall = wanted.camera.wall(wanted.size)
+            pixels = eye_size(mode, wanted.size)
+            wall = psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, "view")
+            self._window.walls = (RigWall(wall, mode),)
+            eyes = wanted.eyes
+            if mode == "mono":
+                eyes = _one_eye(wanted.camera.position)  # to the bit, whatever the separation
+            frame = self._window.make(Pose(), eyes, self.near)
+        return Composited(frame, visitor, _together([frame] + [visitor] * (visitor is not None)))
+
+    def draw(self, wanted: Wanted, done: Composited) -> tuple[dict[str, NDArray[np.float32]], float]:
+        """Pictures by the names of eyes, as `Stereo.channels` has them, and the milliseconds that they took.
+
+        (h, w, 4) float32, linear, premultiplied; of the outside view opaque, and the same one for all eyes.
+        They are overwritten by the next call.
+        """
+        start = perf_counter()
+        if wanted.outside:
+            picture = self.draw_room(wanted, done)
+            pictures = dict.fromkeys(("left", "middle", "right"), picture)
+        else:
+            pictures = {p.eye: self.warp(p.eye, p.image, p.view) for p in done.inside.pictures}
+        return pictures, 1e3 * (perf_counter() - start)
+
+    def draw_room(self, wanted: Wanted, done: Composited) -> NDArray[np.float32]:
+        """The view from outside, (h, w, 4) float32, linear, opaque."""
+        walls = {wall.name: self._wall_picture(wall.name, wanted, done) for wall in self._room.walls}
+        volume = None
+        if done.outside is not None:
+            (seen,) = done.outside.pictures
+            volume = self.warp("visitor", seen.image, seen.view)
+        painter = RoomPainter(wanted.camera, wanted.size, walls, volume)
+        self.paint_room(painter, wanted, done)
+        return painter.finished()
+
+    def paint_room(self, painter: outside.Painter, wanted: Wanted, done: Composited) -> None:
+        """The view from outside, whoever paints it."""
+        frame = done.inside
+        outside.paint_room(
+            painter,
+            wanted.camera.position,
+            [wall.in_room(frame.head) for wall in self._room.walls],
+            corners_in_room(self._room.room_from_world, self.renderer.volume),
+            frame.head,
+            frame.eyes,
+            [getattr(frame.eyes, name) for name in dict.fromkeys(p.eye for p in frame.pictures)],
+        )
+
+    def window(self, wanted: Wanted, pictures: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
+        """What the window shows of the pictures of `draw`: (h, w, 4) float32, linear, opaque."""
+        mode = "mono" if wanted.outside else wanted.stereo.shown_mode
+        left, right = (pictures[name] for name in wanted.stereo.channels)
+        return combine(left, right, mode, wanted.size, background=self.background)
+
+    def _wall_picture(self, name: str, wanted: Wanted, done: Composited) -> NDArray[np.uint8]:
+        """What a wall's window shows, (h, w, 3) sRGB."""
+        mode = wanted.stereo.shown_mode
+        own = {p.eye: p for p in done.inside.pictures if p.wall.name == name}
+        drawn = {eye: self.warp(f"{name} {eye}", p.image, p.view) for eye, p in own.items()}
+        if len(drawn) == 1:
+            (only,) = drawn.values()
+            return encoded(only[..., :3] + (1 - only[..., 3:]) * self.background)
+        left, right = (drawn[eye] for eye in wanted.stereo.channels)
+        return encoded(combine(left, right, mode, background=self.background)[..., :3])
+
+    def warp(self, slot: str, image: psw.EyeImage, view: psw.View) -> NDArray[np.float32]:
+        """The picture of a view by the software warp; the next one of the same slot overwrites it."""
+        canvas = self._canvases.get(slot)
+        if canvas is None or canvas.pixels.shape[1::-1] != view.size:
+            canvas = self._canvases[slot] = psw.Canvas(*view.size)
+        return self.renderer.warp(image, view, canvas)
+
+    def _set_up(self, wanted: Wanted) -> None:
+        if wanted.quality != self.renderer.settings.quality:
+            self.renderer.settings = replace(self.renderer.settings, quality=wanted.quality)
+        if wanted.preset != self._preset:
+            self._preset = wanted.preset
+            self.renderer.transfer = self._transfer_of(wanted.preset)
+
+
+def _one_eye(position: np.ndarray) -> EyePair:
+    return EyePair(position, position)
+
+
+def _smaller(wall: psw.Wall) -> psw.Wall:
+    """The same wall with fewer pixels, for a picture of it."""
+    share = min(1.0, WALL_PIXELS / max(wall.pixels))
+    pixels = tuple(max(round(n * share), 1) for n in wall.pixels)
+    return psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, wall.name)
+
+
+def _together(frames: list[Frame]) -> dict[str, Any]:
+    """The figures of several eye images as one."""
+    each = [s for frame in frames for s in frame.statistics.values()]
+    sums = {key: sum(s[key] for s in each) for key in ("composite_ms", "encode_ms", "compile_ms", "samples")}
+    largest = max((s["intermediate_size"] for s in each), key=lambda size: size[0] * size[1])
+    return {
+        **sums,
+        "faces": max(s["faces"] for s in each),
+        "intermediate_size": largest,
+        "compositings": sum(frame.compositings for frame in frames),
+        "samples_per_interval": each[-1]["samples_per_interval"],
+        "preintegrated": each[-1]["preintegrated"],
+    }

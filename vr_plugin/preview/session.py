@@ -1,0 +1,134 @@
+"""A preview of one scene: its controller and its pictures put together, from what a user gives."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import persp_sw as psw
+from persp_sw.errors import PerspSWError
+
+from ..cameras import Camera
+from ..formats.opening import open_rig
+from ..placement import corners_in_room, room_from_world
+from ..pose import Pose
+from ..rig import Rig
+from ..room.outside import room_camera
+from ..room.rooms import four_walls
+from .choices import Choices
+from .controller import Preview
+from .keys import KEYS
+from .pictures import PreviewPictures
+
+SIZE = (960, 720)
+UP = (0.0, 0.0, 1.0)  # of a volume's world, where a scene has none: towards a patient's head
+
+
+class PreviewError(PerspSWError):
+    """A preview that cannot be as it was asked for."""
+
+
+def open_preview(
+    scene: psw.Scene,
+    settings: psw.Settings,
+    *,
+    size: tuple[int, int] | None = None,
+    stereo: str = "mono",
+    rig_file: str | Path | None = None,
+    recording: str | Path | None = None,
+    presets: tuple[str, ...] = (),
+    progress: Callable[[int, int, str], None] | None = None,
+) -> tuple[Preview, PreviewPictures]:
+    """A preview of a scene, and what makes its pictures.
+
+    Parameters
+    ----------
+    size
+        Of the window, pixels. None: 960 × 720.
+    rig_file
+        The room of the outside view, in any format that `open_rig` reads; None: `rooms.four_walls`.
+    recording
+        A recorded head path, placed as the rig says.
+    presets
+        Names that the preset keys go through.
+
+    Raises
+    ------
+    PerspSWError
+        Of any kind: whatever of these cannot be read or shown.
+    """
+    size = size or SIZE
+    if not all(16 <= n <= 16384 for n in size):
+        raise PreviewError(f"a window is 16 … 16384 pixels wide and high; given {size[0]} × {size[1]}")
+    rig = four_walls() if rig_file is None else open_rig(rig_file)
+    head_at = None if recording is None else recorded_head(rig, recording)
+    volume, view = scene.volume, scene.view(0)
+
+    def relay(done: int, total: int, what: str) -> None:
+        pictures.progress(done, total, what)  # whoever shows it at the time
+
+    renderer = psw.Renderer(volume, scene.transfer, settings, scene.regions, relay)
+    place = room_from_world(rig, volume)
+    preset = scene.preset.name if scene.preset else None
+    corners = corners_in_room(np.eye(4), volume)  # in its own world
+    preview = Preview(
+        Camera.of_view(view),
+        up=scene.keys.up or UP,
+        extent=float(np.ptp(corners, axis=0).max()) or 1.0,
+        size=size,
+        rig=rig,
+        outside_home=room_camera(rig, size),
+        head_at=head_at,
+        choices=Choices(presets, preset, settings.quality, stereo),
+    )
+
+    def transfer_of(name: str | None) -> psw.TransferFunction:
+        return scene.transfer if name == preset else psw.Scene.of_volume(volume, tf=name).transfer
+
+    pictures = PreviewPictures(
+        renderer,
+        transfer_of,
+        rig=rig,
+        room_from_world=place,
+        background=scene.background,
+        near=view.eye.near,
+        preset=preset,
+    )
+    pictures.progress = progress or pictures.progress
+    return preview, pictures
+
+
+def recorded_head(rig: Rig, recording: str | Path) -> Callable[[float], Pose]:
+    """The head's pose in the room at so many seconds of a recording, which starts again at its end."""
+    from ..trackers.recording import Recording
+
+    place, path = rig.tracker_for(recording), Recording.load(recording)
+    return lambda seconds: place.room_from_head(path.at(seconds))
+
+
+def press(preview: Preview, keys: str) -> None:
+    """Press and release keys, named and parted by spaces; PreviewError where one of them is none."""
+    names = keys.upper().split()
+    unknown = sorted(set(names) - KEYS)
+    if unknown:
+        raise PreviewError(f"there are no keys {', '.join(unknown)}; known are {', '.join(sorted(KEYS))}")
+    for name in names:
+        preview.key(name, True)
+        preview.key(name, False)
+
+
+def folder_for(path: str | Path) -> Path:
+    """The folder, made if it is not there; PreviewError where it cannot be written to."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise PreviewError(
+            f"cannot make the folder {folder}: {error.strerror}; choose another with -o"
+        ) from None
+    if not os.access(folder, os.W_OK):
+        raise PreviewError(f"cannot write to the folder {folder}: permission denied; choose another with -o")
+    return folder

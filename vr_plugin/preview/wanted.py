@@ -1,0 +1,64 @@
+"""What a preview wants drawn: the words between its controller and whoever draws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..cameras import Camera
+from ..eyes import EyePair
+from ..pose import Pose
+from ..stereo import Stereo
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is to be drawn now.
+
+    Attributes
+    ----------
+    camera
+        In the volume's world; of the outside view in the room.
+    size
+        Of the window, pixels.
+    outside
+        The room from outside instead of the volume.
+    stereo
+        How the window shows the eyes.
+    eyes
+        Of the camera, in the volume's world; `separation` is their distance as a share of the pivot's.
+    head, head_eyes
+        In the room; None without one.
+    quality, preset
+        What the pictures should be like; preset None: the scene's own transfer function.
+    overlay, help
+        Which texts lie over the picture.
+    volume_outside
+        Whether the outside view shows the volume itself, not only its box.
+    style, speed
+        How the camera is moved: one of `STYLES`; extents a second.
+    message
+        A line for the user, for a few seconds; "" mostly.
+    moving
+        Whether this differs from what was wanted before, or the next moment will.
+    path_runs
+        Whether the recorded head moves; None without a recording.
+    """
+
+    camera: Camera
+    size: tuple[int, int]
+    outside: bool
+    stereo: Stereo
+    separation: float
+    eyes: EyePair
+    head: Pose | None
+    head_eyes: EyePair | None
+    quality: float
+    preset: str | None
+    overlay: bool
+    help: bool
+    volume_outside: bool
+    style: str
+    speed: float
+    message: str
+    moving: bool
+    path_runs: bool | None

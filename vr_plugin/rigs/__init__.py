@@ -1,0 +1,1 @@
+"""Rig files: read, checked, written; and what of a rig one machine can show."""
