@@ -140,7 +140,7 @@ def test_a_recorded_path_is_inside_the_cave_at_a_plausible_height(name):
 
 def test_the_optitrack_wearer_faces_the_front_wall_with_the_right_eye_on_the_right():
     rig = config("cave4")
-    heads = heads_of(rig.tracker, recording("optitrack-120hz.csv.gz"))
+    heads = heads_of(rig.tracker_for("optitrack-120hz.csv.gz"), recording("optitrack-120hz.csv.gz"))
     look = -np.mean([head.matrix[:3, 2] for head in heads], 0)
     assert np.degrees(np.arccos(-look[2] / np.linalg.norm(look))) < 10
     eyes = np.array([eyes_of_head(head, rig.eyes) for head in heads])

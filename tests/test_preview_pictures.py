@@ -372,7 +372,7 @@ def test_the_command_writes_frames_and_figures(ball_file: Path, tmp_path: Path):
 
 
 def test_a_recorded_head_moves_from_frame_to_frame(ball_file: Path, tmp_path: Path):
-    path = tmp_path / "walk.csv"
+    path = tmp_path / "optitrack-120hz.csv.gz"  # a name that cave4 knows; compressed or not is all the same
     rows = [f"{n / 60},{0.1 * n},1.7,1,0,0,0,1" for n in range(60)]
     path.write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]))
     scene = psw.Scene.of_volume(psw.Volume(ball()), size=SIZE)
@@ -380,7 +380,7 @@ def test_a_recorded_head_moves_from_frame_to_frame(ball_file: Path, tmp_path: Pa
     press(preview, "TAB")
     preview.advance(0.0)
     np.testing.assert_allclose(preview.advance(10 / 60).head.position, (1.0, 1.7, 1.0), atol=1e-9)
-    # In cave4 the tracker is turned by 180° about y, then shifted.
+    # In cave4 that tracker is turned by 180° about y, then shifted.
     rig = ROOT / "configs" / "cave4.toml"
     preview, _ = open_preview(scene, psw.Settings(), size=SIZE, rig_file=rig, recording=path)
     press(preview, "TAB")

@@ -58,7 +58,8 @@ def test_check_as_json():
         front["size"] == [3, 3] and front["faces_eye"] and front["pixel_mm"][0] == pytest.approx(2.93, 0.001)
     )
     assert values["findings"] == [] and values["machines"] == [""]
-    assert values["recordings"][0]["address"] == "hololens-200hz.csv.gz"
+    addresses = [recording["address"] for recording in values["recordings"]]
+    assert addresses == ["optitrack-120hz.csv.gz", "hololens-200hz.csv.gz"]
 
 
 def test_check_says_what_is_doubtful(tmp_path):

@@ -122,8 +122,8 @@ def _facts(file: str, opened: Rig) -> Iterator[tuple[str, str]]:
         f"{_place(look)}",
     )
     yield "tracker", _tracker(opened.tracker)
-    for place in opened.recordings:
-        yield "recording", _tracker(place)
+    if opened.recordings:
+        yield "recordings", "; ".join(map(_tracker, opened.recordings))
     if world.room_from_world is not None:
         yield "volume", "stands as room_from_world says"
     else:
