@@ -44,8 +44,8 @@ VR_RANKS = {
     "pose": 0, "stereo": 0,
     "rig": 1, "projection": 1,
     "eyes": 2, "placement": 2, "screen": 2,
-    "cameras": 3, "rigs": 3, "trackers": 3, "frame": 3, "present": 3, "window": 3, "host": 3,
-    "formats": 4, "loop": 4, "room": 4,
+    "cameras": 3, "rigs": 3, "trackers": 3, "frame": 3, "present": 3, "window": 3, "host_view": 3,
+    "formats": 4, "host": 4, "loop": 4, "room": 4,
     "cave": 5, "preview": 5,
     "commands": 6, "examples": 6,
 }  # fmt: skip
@@ -73,6 +73,10 @@ RESERVED = {
     },
     "glfw": {"vr_plugin.window"},
     "imgui_bundle": {"vr_plugin.panel"},
+    # A host that is not ours, in the example of the plug-in only: nobody needs these packages to use it.
+    "moderngl": {f"vr_plugin.examples.moderngl_{part}" for part in ("host", "scene")},
+    "moderngl_window": {"vr_plugin.examples.moderngl_host"},
+    "pyglm": {"vr_plugin.examples.moderngl_host"},
     "socket": {f"vr_plugin.trackers.{name}" for name in ("dtrack", "vrpn_client", "vrpn_server")},
 }
 

@@ -189,3 +189,21 @@ ON_ITS_WALL = 1 / 256
 # Mean of a picture of 192 × 144 pixels, sRGB 0 … 1. OpenGL blends the soft rims of lines and letters in
 # linear light, Pillow in sRGB, where half of white is 0.22 darker; rims are some 7 % of so small a picture.
 ROOM_LINES = 0.015
+
+# --- Plug-in ----------------------------------------------------------------------------------------------
+
+# Inverses of float64 matrices with condition numbers up to 1e5 (windows far off the axis): 1e-16 · 1e5 of
+# places up to 1e3 pixels away.
+HOST_PIXELS = 1e-7
+# A host's float32 view matrix shifts by some 100 units, rounded to 4e-6, at distances of 20 units and more,
+# seen in 200 pixels of 0.6 rad: 4e-6 / 20 / 0.6 · 200 = 7e-5, a few times for three axes and their turns.
+HOST_FLOAT32_PIXELS = 1e-3
+# A picture of half floats holds the scene and the scene with the volume, each rounded by 2⁻¹² of values below
+# 1, a sum of which is compared; the scene itself is one of four samples' mean.
+HOST_PICTURE_HALF = 1e-3
+# Bilinear weights of 8 bits along each axis, of neighbours that differ by less than 1/4 in a smooth volume:
+# 2 · 2⁻⁹ / 4; and corners in float32.
+QUADS = 2e-3
+# An sRGB picture of bytes: rounded when the scene is written, half a step, of which (1 − α) is let through
+# and made up to twice as many by the curve, where light is low; and rounded again.
+CPP_BYTES = 1.5

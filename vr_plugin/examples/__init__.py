@@ -1,0 +1,1 @@
+"""Programs of others that show our volume, to read and to run."""
