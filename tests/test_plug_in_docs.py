@@ -17,7 +17,7 @@ from samples import ROOT, ball
 from tolerances import QUADS
 from views import DIRECTIONS, random_pose, view_of
 
-from persp_sw import Renderer, Settings, TransferFunction, Volume
+from persp_sw import Renderer, Settings, TransferFunction, View, Volume
 from vr_plugin.host import VolumeInHost
 
 TEXT = (ROOT / "docs" / "plug-in.md").read_text()
@@ -60,7 +60,7 @@ def test_files_and_pictures_exist():
 
 
 @pytest.mark.gl
-@pytest.mark.parametrize("distance, single, most", [(1.7, 3, 1), (0.9, 1, 3)])
+@pytest.mark.parametrize("distance, single, most", [(1.7, 3, 1), (0.9, 1, 3), (np.inf, 3, 1)])
 def test_its_quads_are_the_volumes_picture(gl_context, rng, distance, single, most):
     """By bytes and formulas alone, drawn by moderngl as ordinary textured quads, at any distance."""
     names = {"np": np, "io": io}
@@ -82,7 +82,12 @@ def test_its_quads_are_the_volumes_picture(gl_context, rng, distance, single, mo
             void main() { colour = texture(face, at); }""",
         )
         for towards in DIRECTIONS:
-            view = view_of(volume, towards, distance, fovy=60, size=(90, 70))
+            if np.isfinite(distance):
+                view = view_of(volume, towards, distance, fovy=60, size=(90, 70))
+                clip = view.clip_from_world(1e-3, 1e4)
+            else:
+                view = View.parallel(volume.centre + towards, volume.centre, (0.1, 0.9, 0.3), 40, (90, 70))
+                clip = view.clip_from_world(-1e4, 1e4)
             image = renderer.composite(view.eye, [view.wall])
             counts.add(len(image.faces))
             target = context.framebuffer([context.texture(view.size, 4, dtype="f4")])
@@ -91,7 +96,6 @@ def test_its_quads_are_the_volumes_picture(gl_context, rng, distance, single, mo
                 target.clear()
                 context.enable_only(moderngl.BLEND)
                 context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-                clip = view.clip_from_world(1e-3, 1e4)
                 for corners, places, pixels in names["quads"](image.to_bytes(), away):
                     texture = context.texture(pixels.shape[1::-1], 4, pixels.tobytes(), dtype="f4")
                     texture.repeat_x = texture.repeat_y = False

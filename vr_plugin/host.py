@@ -162,6 +162,7 @@ class VolumeInHost:
             made the frame before.
         near
             Distance before each eye, host units, in which nothing is shown; nothing else clips the volume.
+            Of no effect in parallel views.
 
         Raises
         ------
