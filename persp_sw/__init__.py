@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from .geometry.regions import Cut, Regions
     from .geometry.view import Eye, View, Wall
     from .optics.transfer import TransferFunction
+    from .quality.controller import FrameTimeController
+    from .quality.features import FrameCost, SceneFeatures
+    from .quality.ladder import Ladder
     from .renderer import Renderer
     from .scene import Scene
     from .settings import Settings
@@ -31,12 +34,16 @@ __all__ = [
     "Cut",
     "Eye",
     "EyeImage",
+    "FrameCost",
+    "FrameTimeController",
     "Framebuffer",
+    "Ladder",
     "OffscreenContext",
     "PerspSWError",
     "Regions",
     "Renderer",
     "Scene",
+    "SceneFeatures",
     "Settings",
     "TextureWarp",
     "TransferFunction",
@@ -55,12 +62,16 @@ _HOME = {
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
+    "FrameCost": ".quality.features",
+    "FrameTimeController": ".quality.controller",
     "Framebuffer": ".warp.framebuffer",
+    "Ladder": ".quality.ladder",
     "OffscreenContext": ".warp.context",
     "PerspSWError": ".errors",
     "Regions": ".geometry.regions",
     "Renderer": ".renderer",
     "Scene": ".scene",
+    "SceneFeatures": ".quality.features",
     "Settings": ".settings",
     "TextureWarp": ".warp.texture",
     "TransferFunction": ".optics.transfer",

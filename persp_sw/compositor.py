@@ -44,21 +44,8 @@ def composite_eye(
     """
     volume = detail.volume
     pose = volume.world_from_object
-    object_from_world = np.linalg.inv(pose)
-    eye_object = object_from_world[:3] @ (*eye.position, eye.w)
-    parts, low, high = _seen_parts(detail.store(0), regions, eye_object, eye.w)
-    faces: list[Face] = []
-    if parts:
-        views = [View(eye, wall) for wall in walls]
-        geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
-        faces = plan_faces(
-            geometry,
-            quality=settings.quality,
-            single_face_tangent=settings.single_face_tangent,
-            max_size=settings.max_intermediate,
-            intermediate_size=settings.intermediate_size,
-            previous=previous,
-        )
+    geometry, parts, faces = plan_eye(detail, regions, settings, eye, walls, previous)
+    eye_object, low, high = geometry.eye, geometry.low, geometry.high
     pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
     image = EyeImage(eye, pose, tuple(faces), pixels, 0, np.array([low, high]), regions.planes(volume))
@@ -70,6 +57,31 @@ def composite_eye(
     )
     close_seams(faces, images)
     return replace(image, samples=samples)
+
+
+def plan_eye(
+    detail: DetailStore,
+    regions: Regions,
+    settings: Settings,
+    eye: Eye,
+    walls: Sequence[Wall],
+    previous: Sequence[Face] = (),
+) -> tuple[EyeGeometry, list[Part], list[Face]]:
+    """What `composite_eye` will composite: the parts seen, front to back, and the faces; no pixel yet."""
+    object_from_world = np.linalg.inv(detail.volume.world_from_object)
+    eye_object = object_from_world[:3] @ (*eye.position, eye.w)
+    parts, low, high = _seen_parts(detail.store(0), regions, eye_object, eye.w)
+    views = [View(eye, wall) for wall in walls] if parts else []
+    geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
+    faces = plan_faces(
+        geometry,
+        quality=settings.quality,
+        single_face_tangent=settings.single_face_tangent,
+        max_size=settings.max_intermediate,
+        intermediate_size=settings.intermediate_size,
+        previous=previous,
+    )
+    return geometry, parts, faces
 
 
 def _seen_parts(

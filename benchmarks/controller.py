@@ -1,0 +1,105 @@
+"""Frame-time control on recorded costs: ours, a fixed quality, and OpenCOVER's rule, in one harness.
+
+    python benchmarks/controller.py [--frames 3600] [--seed 1] [--targets 60 90 120]
+
+Plays the path of `recorded_costs.json` (head into the volume and back, to and fro) with the noise recorded
+on it, drawn anew for each frame, the same for all rules. Prints the share of frames within 10 % of the
+target, the quantiles of their times over it, the range of quality and its largest change from frame to frame.
+*free*: the share among frames whose target some quality between the limits can meet, costs without noise.
+"""
+
+from __future__ import annotations
+
+import argparse
+from math import exp
+from pathlib import Path
+
+import numpy as np
+
+from persp_sw.measure.replay import Disturbance, RecordedScene, Rule, Trace, replay
+from persp_sw.quality.controller import Choice, FrameTimeController
+from persp_sw.quality.features import FrameCost, SceneFeatures
+
+RECORDED = Path(__file__).with_name("recorded_costs.json")
+LIMITS = 0.25, 2.0
+RATE = 60.0
+HEAD = """                 within ±10 %      time / target        the same, no noise
+  rule            all  clean   free    p50    p95    p99    p50    p95    p99  quality      step"""
+
+
+class Fixed:
+    """One quality always."""
+
+    def __init__(self, quality: float):
+        self.quality = quality
+
+    def next(self, features: SceneFeatures, measured: FrameCost | None = None) -> Choice:
+        """That quality."""
+        return Choice(self.quality, "", why="held")
+
+
+class OpenCover:
+    """After two frames in a row outside ±10 %: q += 0.3 · q · (fps − wanted) / wanted, within the limits."""
+
+    def __init__(self, target_ms: float, quality: float = 1.0):
+        self.target_ms, self.quality, self.misses = target_ms, quality, 0
+
+    def next(self, features: SceneFeatures, measured: FrameCost | None = None) -> Choice:
+        """The rule as its authors describe it."""
+        if measured is not None:
+            rate = self.target_ms / measured.ms  # fps over the wanted
+            self.misses = self.misses + 1 if abs(rate - 1) > 0.1 else 0
+            if self.misses >= 2:
+                self.quality = min(max(self.quality * (1 + 0.3 * (rate - 1)), LIMITS[0]), LIMITS[1])
+                self.misses = 0
+        return Choice(self.quality, "", why="")
+
+
+def row(name: str, trace: Trace, target: float, free: np.ndarray) -> str:
+    """A line of the table."""
+    over, clean = trace.ms / target, trace.clean_ms / target
+    within = np.abs(clean - 1) <= 0.1
+    shares = np.mean(np.abs(over - 1) <= 0.1), within.mean(), within[free].mean()
+    cells = [f"{name:12}", *(f"{share:5.0%}" for share in shares)]
+    cells += [f"{q:5.2f}" for times in (over, clean) for q in np.quantile(times, (0.5, 0.95, 0.99))]
+    cells.append(f"{trace.quality.min():.2f} … {trace.quality.max():.2f}")
+    cells.append(f"{exp(np.abs(np.diff(np.log(trace.quality))).max()) - 1:4.0%}")
+    return "  " + "  ".join(cells)
+
+
+def reachable(scene: RecordedScene, target: float, times: np.ndarray) -> np.ndarray:
+    """Which frames have a quality between the limits, costs without noise, that meets the target."""
+    low, high = (np.array([scene.cost(t, "", q).ms for t in times]) for q in LIMITS)
+    return (low <= target) & (target <= high)
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--frames", type=int, default=3600)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--targets", type=float, nargs="+", default=[60, 90, 120], help="frames a second")
+    options = parser.parse_args()
+    times = np.arange(options.frames) / RATE
+    for scene in RecordedScene.load(RECORDED).values():
+        noise = np.random.default_rng(options.seed).choice(scene.noise, options.frames)
+        disturbance = Disturbance(noise=lambda n, noise=noise: float(noise[n]))
+        for rate in options.targets:
+            target = 1e3 / rate
+            free = reachable(scene, target, times)
+            print(f"{scene.name}, {rate:g} Hz, {target:.1f} ms to composite in, {free.mean():.0%} are free")
+            print(HEAD)
+            rules: dict[str, Rule] = {
+                "ours": FrameTimeController(target, min_quality=LIMITS[0], max_quality=LIMITS[1]),
+                "OpenCOVER's": OpenCover(target),
+                "fixed 1": Fixed(1.0),
+            }
+            for name, rule in rules.items():
+                trace = replay(scene, rule, options.frames, time=lambda n: n / RATE, disturbance=disturbance)
+                print(row(name, trace, target, free))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Steady frames: which accuracy can be afforded in the time a frame has."""
