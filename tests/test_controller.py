@@ -244,9 +244,7 @@ def test_a_held_quality_stays_and_control_goes_on_from_it():
     assert after.quality[0] <= LIMITS[1]
     assert after.quality[-1] == pytest.approx(1.0, rel=0.1)
     controller.hold()
-    locked = replay(
-        scene, controller, 50, time=still(2.5), disturbance=Disturbance(machine=lambda frame: 4)
-    )
+    locked = replay(scene, controller, 50, time=still(2.5), disturbance=Disturbance(machine=lambda frame: 4))
     assert (locked.quality == after.quality[-1]).all()
 
 

@@ -22,7 +22,7 @@ from .ladder import Ladder, Rung
 
 # Predicted time over the budget: where quality aims, and between which it stays as it is. Wider by a part
 # of the prediction's own uncertainty.
-_AIM, _LEAST, _MOST = 0.96, 0.92, 1.005
+_AIM, _LEAST, _MOST = 0.975, 0.935, 1.02
 _WIDER = 0.7
 # While it moves it goes on to this near the aim.
 _ARRIVED = 0.01

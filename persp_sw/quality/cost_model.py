@@ -15,7 +15,7 @@ _SHARES = np.array([0.1, 0.2, 0.5, 0.2])
 _UNCERTAIN = 0.5
 _LEAST_SHARE = 1e-3
 # What a step in faces, samples or pixels may add to the error of the model's form, as a part of it (logs).
-_FORM_ERROR = 0.3
+_FORM_ERROR = 0.5
 # Residuals count up to this many deviations.
 _CLIP = 3.0
 # Frames that the estimate remembers: few after a change, many when nothing changes.

@@ -101,7 +101,7 @@ def samples_in_box(geometry: EyeGeometry, face: Face) -> float:
     of x voxels is x / (pitch · D) pixels. Steep rays, which leave the box early, so count for what they take.
 
     Accuracy: packets of 16 pixels take whole samples at its edges, steep ones twice as many: the count is up
-    to 1.6 times this, in a ratio that changes slowly as the eye moves.
+    to twice this, in a ratio that changes slowly as the eye moves.
     """
     i, j, k = STANDARD_AXES[face.axis]
     low, high = geometry.low[[i, j, k]], geometry.high[[i, j, k]]

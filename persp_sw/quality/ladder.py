@@ -81,7 +81,7 @@ class Rung:
 class Ladder:
     """Rungs in the order in which they are climbed.
 
-    Neighbours overlap in cost, so that one can stay on either of them about the place where one would change.
+    Neighbours should overlap in cost, so that one can stay on either about the place where one would change.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Ladder:
     Raises
     ------
     SettingsError
-        No rung, points that do not ascend, settings that do not exist, rungs that do not overlap.
+        No rung, points or rungs that do not ascend, settings that do not exist.
     """
 
     rungs: tuple[Rung, ...]
@@ -109,8 +109,8 @@ class Ladder:
                 (low, high), (next_low, next_high) = (
                     (r.points[0].cost, r.points[-1].cost) for r in (one, other)
                 )
-                if not (low < next_low < high < next_high):
-                    problems.append(f"rungs {one.name!r} and {other.name!r} do not overlap upwards in cost")
+                if not (low < next_low and high < next_high):
+                    problems.append(f"rungs {one.name!r} and {other.name!r} do not ascend in cost")
         if problems:
             raise SettingsError(f"this is no ladder of settings: {'; '.join(problems)}")
 
@@ -179,8 +179,8 @@ def ladder_from_points(
 ) -> Ladder:
     """A ladder of the measured front: (way's name, its changes, point), in any order.
 
-    Ways with a single point on the front are left out, for there is nothing to walk; so is one that costs
-    nothing that the ones before do not reach.
+    Ways with a single point on the front are left out, for there is nothing to walk; so are those that do not
+    overlap in cost with the one before, or do not go beyond it.
 
     Raises
     ------
