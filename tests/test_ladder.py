@@ -132,6 +132,18 @@ def test_the_controller_climbs_where_time_is_left_and_comes_down(time):
     assert changes == 3
 
 
+def test_what_the_next_rung_costs_at_least_must_fit():
+    scene = SCENES["fog"]
+    low, high = (
+        Rung(mode, scene.changes[mode], tuple(Point(q, scene.cost(1.0, mode, q).ms) for q in qualities))
+        for mode, qualities in (("1 sample", (0.25, 0.5, 0.71)), ("2 samples", (1.41, 2.0)))
+    )
+    target = (low.points[-1].cost * high.points[0].cost) ** 0.5
+    trace = replay(scene, FrameTimeController(target, Ladder((low, high))), 300, time=lambda _: 1.0)
+    assert set(trace.rung[20:]) == {"1 sample"}
+    assert set(trace.why[20:]) == {"most"}
+
+
 def test_between_two_rungs_it_stays_on_one():
     scene, ladder = SCENES["fog"], two_rungs()
     rng = np.random.default_rng(3)
