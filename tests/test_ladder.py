@@ -77,6 +77,12 @@ def test_a_saved_ladder_comes_back_for_its_machine_and_volume_alone(tmp_path):
     assert Ladder.load(tmp_path / "absent", ladder.machine, ladder.volume) == Ladder.default()
 
 
+def test_a_file_of_another_machine_is_not_used(tmp_path):
+    other = Ladder((ONE,), "other", "v").save(tmp_path)
+    other.rename(Ladder((ONE,), "m", "v").save(tmp_path))
+    assert Ladder.load(tmp_path, "m", "v") == Ladder.default()
+
+
 def test_names_that_differ_in_punctuation_alone_have_files_of_their_own(tmp_path):
     paths = {Ladder((ONE,), "m", volume).save(tmp_path) for volume in ("a b", "a/b", "a_b")}
     assert len(paths) == 3
