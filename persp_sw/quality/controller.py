@@ -66,7 +66,7 @@ class Choice:
     features: SceneFeatures | None = field(default=None, repr=False)
 
     def apply(self, base: Settings) -> Settings:
-        """The settings of this frame, all else as in `base`."""
+        """The settings of this frame, all else as in `base`, the user's own (not another choice's)."""
         return replace(base, quality=self.quality, intermediate_size=None, **self.changes)
 
 
