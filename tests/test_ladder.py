@@ -107,7 +107,7 @@ def test_a_ladder_of_another_version_is_not_used(tmp_path):
 def test_a_front_becomes_a_ladder():
     points = [(rung.name, rung.changes, point) for rung in (TWO, ONE) for point in rung.points]
     assert ladder_from_points(points).rungs == (ONE, TWO)
-    alone = ("three", {"samples_per_interval": 4}, Point(2.0, 80.0))  # nothing to walk
+    alone = ("three", {"samples_per_interval": 4}, Point(0.3, 0.1))  # nothing to walk
     far = [("four", {"samples_per_interval": 4}, Point(q, 50 * q)) for q in (1.0, 2.0)]  # a gap before it
     assert ladder_from_points([*points, alone, *far]).rungs == (ONE, TWO)
 
