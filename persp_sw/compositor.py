@@ -21,7 +21,7 @@ from .kernels.composite import composite as composite_face
 from .kernels.packet import IntegralTable, Table
 from .kernels.scanline import Level
 from .optics.classification import Classification
-from .sampling import choose_sampling
+from .sampling import Sampling, choose_sampling
 from .seams import close_seams
 from .settings import Settings
 from .volume.detail import DetailStore
@@ -50,8 +50,9 @@ def composite_eye(
     threads = settings.threads or _jit.max_threads()
     image = EyeImage(eye, pose, tuple(faces), pixels, 0, np.array([low, high]), regions.planes(volume))
     images = [image.face_pixels(number) for number in range(len(faces))]
+    sampling = choose_sampling(settings, classification, volume)
     samples = sum(
-        _composite(detail, classification, part, settings, eye, eye_object, face, threads, out)
+        _composite(detail, classification, part, settings, sampling, eye, eye_object, face, threads, out)
         for face, out in zip(faces, images, strict=True)
         for part in parts
     )
@@ -103,6 +104,7 @@ def _composite(
     classification: Classification,
     part: Part,
     settings: Settings,
+    sampling: Sampling,
     eye: Eye,
     eye_object: NDArray[np.float64],
     face: Face,
@@ -113,7 +115,7 @@ def _composite(
     volume = detail.volume
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
-    least, preintegrated = choose_sampling(settings, classification, volume)
+    least, preintegrated = sampling
     per_interval = face.samples_per_interval(least)
     low, high = part.low[axes], part.high[axes]
     (o_i, o_j), offset_pitch, (t_i, t_j), pitch, k_0 = face.rays(eye_object[axes])

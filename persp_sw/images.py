@@ -59,6 +59,20 @@ def check_output(path: str | Path) -> Path:
     return path
 
 
+def output_folder(path: str | Path) -> Path:
+    """The folder that pictures go to, made if it is not there; FileError where it cannot be written to."""
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"cannot make the folder {folder}: {error.strerror}; choose another with -o"
+        ) from None
+    if not os.access(folder, os.W_OK):
+        raise FileError(f"cannot write to the folder {folder}: permission denied; choose another with -o")
+    return folder
+
+
 def srgb(linear: ArrayLike) -> NDArray[np.float64]:
     """Linear light 0 … 1 encoded for screens by the sRGB curve, 0 … 1; what lies outside is clipped."""
     linear = np.clip(np.asarray(linear, np.float64), 0, 1)

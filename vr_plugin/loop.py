@@ -15,7 +15,6 @@ import persp_sw as psw
 from .eyes import eyes_of_head
 from .frame import Frame, FrameMaker
 from .placement import room_from_world
-from .pose import Pose
 from .rig import Rig
 from .stereo import Stereo
 from .trackers import HeadFilter, NoTracker, OutsideWatch, Sample, Tracker, Wand, wand_sensor
@@ -74,9 +73,6 @@ class Loop:
             clip = (*self._regions.clip, *self.wand.clip_planes)
             self.renderer.regions = replace(self._regions, clip=clip)
         head = self.head.pose_at(now if shown_at is None else shown_at)
-        return self._frame(head)
-
-    def _frame(self, head: Pose) -> Frame:
         eyes = eyes_of_head(head, self.rig.eyes)
         if self.outside is not None:
             self.outside.look(eyes)

@@ -91,7 +91,8 @@ def demo(
     from ..settings import Settings
 
     settings = Settings(quality=quality, samples_per_interval=int(samples), threads=threads)
-    folder = _folder(out)
+    folder = images.output_folder(out)
+    images.check_output(folder / "front.png")
     with progress_bars() as progress:
         if volume_file:
             scene = open_scene(volume_file, progress)
@@ -185,18 +186,6 @@ def run(
         )
     progress(len(views), len(views), "views")
     return rows
-
-
-def _folder(out: str) -> Path:
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"cannot make the folder {folder}: {error.strerror}; choose another with -o"
-        ) from None
-    images.check_output(folder / "front.png")
-    return folder
 
 
 def _print(rows: list[dict[str, Any]], folder: Path, volume: Volume) -> None:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
@@ -14,6 +14,9 @@ from ..optics.presets import NAMES
 from ..scene import Scene
 from ..volume.grid import Volume
 from .output import ProgressCall
+
+if TYPE_CHECKING:
+    from ..settings import Settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -143,6 +146,21 @@ def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
     if Path(path).suffix.lower() in (".json", ".toml"):
         return Scene.load(path, progress=progress, **keys)
     return Scene.of_file(path, progress=progress, **keys)
+
+
+def settings_for(
+    scene: Scene, quality: float, samples: str | None, residual: float, threads: int | None, **more: Any
+) -> Settings:
+    """The settings of `setting_options` for a scene, whose hint holds where no samples are given."""
+    from ..settings import Settings  # numba loads here, not for --help
+
+    return Settings(
+        quality=quality,
+        samples_per_interval=int(samples) if samples else scene.samples_per_interval,
+        residual=residual,
+        threads=threads,
+        **more,
+    )
 
 
 def say_missing_voxels(volume: Volume) -> None:

@@ -16,6 +16,7 @@ from .options import (
     region_options,
     say_missing_voxels,
     setting_options,
+    settings_for,
     view_options,
     volume_options,
     warp_option,
@@ -87,17 +88,16 @@ def render(
     SCENE is a scene file (.json, .toml) or any volume file; then everything else has a default. A .png shows
     the picture over the background, sRGB-encoded; .npy and .exr hold linear, premultiplied float32 RGBA.
     """
-    from ..settings import Settings  # numba loads here, not for --help
-
     with progress_bars() as progress:
         chosen = open_scene(scene, progress, **keys)
         path = images.check_output(out or f"{chosen.name}-render.png")
-        settings = Settings(
-            quality=quality,
-            samples_per_interval=int(samples) if samples else chosen.samples_per_interval,
+        settings = settings_for(
+            chosen,
+            quality,
+            samples,
+            residual,
+            threads,
             preintegrated=preintegrated,
-            residual=residual,
-            threads=threads,
             intermediate_size=intermediate,
         )
         values = {

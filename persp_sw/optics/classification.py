@@ -66,7 +66,7 @@ class Classification:
         """The table's integrals, made when they are first asked for."""
         return Preintegration.of(self.table)
 
-    @property
+    @cached_property
     def largest_extinction(self) -> float:
         """Largest extinction of any entry, per world unit."""
         return float(self.table[:, 3].max())

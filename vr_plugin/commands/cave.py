@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from persp_sw.commands.options import json_option, open_scene, setting_options, tf_option, volume_options
+from persp_sw.commands.options import (
+    json_option,
+    open_scene,
+    setting_options,
+    settings_for,
+    tf_option,
+    volume_options,
+)
 from persp_sw.commands.output import numbers, print_facts, print_json, progress_bars
 
 if TYPE_CHECKING:
@@ -95,14 +102,10 @@ def cave(
         chosen = replace(chosen, tracker=chosen.tracker_for(recording))
     if no_tracking:
         chosen = replace(chosen, tracker=replace(chosen.tracker, kind="none"))
+    folder = psw.images.output_folder(out) if offscreen else Path(out)
     with progress_bars() as progress:
         shown = open_scene(scene, progress, **keys)
-        settings = psw.Settings(
-            quality=quality,
-            samples_per_interval=int(samples) if samples else shown.samples_per_interval,
-            residual=residual,
-            threads=threads,
-        )
+        settings = settings_for(shown, quality, samples, residual, threads)
         renderer = psw.Renderer(shown.volume, shown.transfer, settings, shown.regions, progress)
         tracker = open_tracker(
             chosen.tracker,
@@ -120,7 +123,7 @@ def cave(
             else:
                 values = _offscreen(
                     loop, chosen, warp, frames or 10, rate or chosen.quality.target_hz, start, every,
-                    separate, judge, _folder(out), Path(scene).stem, shown.background, progress,
+                    separate, judge, folder, Path(scene).stem, shown.background, progress,
                 )  # fmt: skip
         finally:
             loop.close()
@@ -129,17 +132,6 @@ def cave(
         print_json(values)
     else:
         _print(values)
-
-
-def _folder(out: str) -> Path:
-    from persp_sw.errors import PerspSWError
-
-    folder = Path(out)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PerspSWError(f"cannot make the folder {folder}: {error.strerror}; choose another: -o") from None
-    return folder
 
 
 def _offscreen(

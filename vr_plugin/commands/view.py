@@ -20,6 +20,7 @@ from persp_sw.commands.options import (
     region_options,
     say_missing_voxels,
     setting_options,
+    settings_for,
     tf_option,
     volume_options,
 )
@@ -109,21 +110,16 @@ def view(
     import persp_sw as psw
 
     from ..preview.run import FRAME_SECONDS, run_offscreen
-    from ..preview.session import PreviewError, folder_for, open_preview, press
+    from ..preview.session import PreviewError, open_preview, press
 
     if not offscreen:
         check_display()
     if frames is not None and frames < 1:
         raise PreviewError(f"--frames is at least 1; given {frames}")
-    folder = folder_for(out)
+    folder = psw.images.output_folder(out)
     with progress_bars() as progress:
         chosen = open_scene(scene, progress, **keys)
-        settings = psw.Settings(
-            quality=quality,
-            samples_per_interval=int(samples) if samples else chosen.samples_per_interval,
-            residual=residual,
-            threads=threads,
-        )
+        settings = settings_for(chosen, quality, samples, residual, threads)
         preview, pictures = open_preview(
             chosen,
             settings,

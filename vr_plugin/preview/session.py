@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -118,17 +117,3 @@ def press(preview: Preview, keys: str) -> None:
     for name in names:
         preview.key(name, True)
         preview.key(name, False)
-
-
-def folder_for(path: str | Path) -> Path:
-    """The folder, made if it is not there; PreviewError where it cannot be written to."""
-    folder = Path(path)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise PreviewError(
-            f"cannot make the folder {folder}: {error.strerror}; choose another with -o"
-        ) from None
-    if not os.access(folder, os.W_OK):
-        raise PreviewError(f"cannot write to the folder {folder}: permission denied; choose another with -o")
-    return folder
