@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from .eye_image import EyeImage
     from .geometry.regions import Cut, Regions
     from .geometry.view import Eye, View, Wall
+    from .measure.trace import FrameRecord, TraceWriter
     from .optics.transfer import TransferFunction
     from .quality.controller import FrameTimeController
     from .quality.features import FrameCost, SceneFeatures
@@ -35,6 +36,7 @@ __all__ = [
     "Eye",
     "EyeImage",
     "FrameCost",
+    "FrameRecord",
     "FrameTimeController",
     "Framebuffer",
     "Ladder",
@@ -46,6 +48,7 @@ __all__ = [
     "SceneFeatures",
     "Settings",
     "TextureWarp",
+    "TraceWriter",
     "TransferFunction",
     "View",
     "Volume",
@@ -63,6 +66,7 @@ _HOME = {
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
     "FrameCost": ".quality.features",
+    "FrameRecord": ".measure.trace",
     "FrameTimeController": ".quality.controller",
     "Framebuffer": ".warp.framebuffer",
     "Ladder": ".quality.ladder",
@@ -74,6 +78,7 @@ _HOME = {
     "SceneFeatures": ".quality.features",
     "Settings": ".settings",
     "TextureWarp": ".warp.texture",
+    "TraceWriter": ".measure.trace",
     "TransferFunction": ".optics.transfer",
     "View": ".geometry.view",
     "Volume": ".volume.grid",

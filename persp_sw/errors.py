@@ -13,6 +13,10 @@ class FileError(PerspSWError):
     """A file that is missing, truncated, of the wrong kind or not supported."""
 
 
+class TraceError(FileError):
+    """A trace that cannot be written or read."""
+
+
 class TransferFunctionError(PerspSWError):
     """Control points that do not make a transfer function."""
 
