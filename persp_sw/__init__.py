@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from . import images, reference
+    from .cancel import Cancel, Cancelled
     from .errors import PerspSWError
     from .eye_image import EyeImage
     from .geometry.regions import Cut, Regions
     from .geometry.view import Eye, View, Wall
     from .measure.trace import FrameRecord, TraceWriter
     from .optics.transfer import TransferFunction
+    from .planning import EyePlan
     from .quality.controller import FrameTimeController
     from .quality.features import FrameCost, SceneFeatures
     from .quality.ladder import Ladder
@@ -31,10 +33,13 @@ if TYPE_CHECKING:
     from .warp.texture import TextureWarp
 
 __all__ = [
+    "Cancel",
+    "Cancelled",
     "Canvas",
     "Cut",
     "Eye",
     "EyeImage",
+    "EyePlan",
     "FrameCost",
     "FrameRecord",
     "FrameTimeController",
@@ -61,10 +66,13 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOME = {
+    "Cancel": ".cancel",
+    "Cancelled": ".cancel",
     "Canvas": ".warp.canvas",
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
+    "EyePlan": ".planning",
     "FrameCost": ".quality.features",
     "FrameRecord": ".measure.trace",
     "FrameTimeController": ".quality.controller",

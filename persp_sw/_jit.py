@@ -74,6 +74,7 @@ from numba.extending import intrinsic, overload  # noqa: E402
 __all__ = [
     "VECTORS",
     "bits_of",
+    "byte_now",
     "compile_seconds",
     "inlined_kernel",
     "intrinsic",
@@ -153,6 +154,21 @@ def bits_of(_context, flags):
         return builder.bitcast(builder.icmp_unsigned("!=", loaded, bytes_(None)), ir.IntType(64))
 
     return types.uint64(flags), build
+
+
+@intrinsic
+def byte_now(_context, flags):
+    """The first byte of a uint8 array as it is in memory now: another thread may have written it.
+
+    A plain load would be taken out of the loop, and never see that. LLVM leaves a monotonic one where it is;
+    on x86 and ARM it is an ordinary load.
+    """
+
+    def build(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.load_atomic(data, "monotonic", 1)
+
+    return types.uint8(flags), build
 
 
 @intrinsic

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,23 +9,24 @@ from numpy.typing import NDArray
 
 from . import _jit
 from .arrays import Image
+from .cancel import Cancel
 from .eye_image import EyeImage
 from .geometry.detail_zones import detail_zones
-from .geometry.faces import EyeGeometry, Face, plan_faces
-from .geometry.parts import Part, shown_parts
+from .geometry.faces import Face
+from .geometry.parts import Part
 from .geometry.regions import Regions
-from .geometry.view import Eye, View, Wall
+from .geometry.view import Eye
 from .kernels.composite import Rays
 from .kernels.composite import composite as composite_face
 from .kernels.packet import IntegralTable, Table
 from .kernels.scanline import Level
 from .optics.classification import Classification
+from .planning import EyePlan
 from .sampling import Sampling, choose_sampling
 from .seams import close_seams
 from .settings import Settings
 from .volume.detail import DetailStore
 from .volume.levels import STANDARD_AXES
-from .volume.runs import RunStore
 
 
 def composite_eye(
@@ -34,69 +34,40 @@ def composite_eye(
     classification: Classification,
     regions: Regions,
     settings: Settings,
-    eye: Eye,
-    walls: Sequence[Wall],
-    previous: Sequence[Face] = (),
+    plan: EyePlan,
+    cancel: Cancel | None = None,
 ) -> EyeImage:
-    """The eye image that all of `walls` need; no faces where no wall shows anything visible.
+    """The eye image that all of the plan's walls need; no faces where no wall shows anything visible.
 
-    `previous`: the faces of this eye's frame before, which are kept where they serve about as well.
+    `plan` is of these regions and of what `detail` shows now. `cancel` is looked at before every row of
+    pixels; what is encoded, is encoded to the end.
+
+    Raises
+    ------
+    Cancelled
+        `cancel` was asked to.
     """
+    cancel = cancel or Cancel()
+    cancel.check()
     volume = detail.volume
     pose = volume.world_from_object
-    geometry, parts, faces = plan_eye(detail, regions, settings, eye, walls, previous)
-    eye_object, low, high = geometry.eye, geometry.low, geometry.high
+    eye, geometry, faces = plan.eye, plan.geometry, plan.faces(settings)
     pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
-    image = EyeImage(eye, pose, tuple(faces), pixels, 0, np.array([low, high]), regions.planes(volume))
+    image = EyeImage(
+        eye, pose, tuple(faces), pixels, 0, np.array([geometry.low, geometry.high]), regions.planes(volume)
+    )
     images = [image.face_pixels(number) for number in range(len(faces))]
     sampling = choose_sampling(settings, classification, volume)
     samples = sum(
-        _composite(detail, classification, part, settings, sampling, eye, eye_object, face, threads, out)
+        _composite(
+            detail, classification, part, settings, sampling, eye, geometry.eye, face, threads, cancel, out
+        )
         for face, out in zip(faces, images, strict=True)
-        for part in parts
+        for part in plan.parts
     )
     close_seams(faces, images)
     return replace(image, samples=samples)
-
-
-def plan_eye(
-    detail: DetailStore,
-    regions: Regions,
-    settings: Settings,
-    eye: Eye,
-    walls: Sequence[Wall],
-    previous: Sequence[Face] = (),
-) -> tuple[EyeGeometry, list[Part], list[Face]]:
-    """What `composite_eye` will composite: the parts seen, front to back, and the faces; no pixel yet."""
-    object_from_world = np.linalg.inv(detail.volume.world_from_object)
-    eye_object = object_from_world[:3] @ (*eye.position, eye.w)
-    parts, low, high = _seen_parts(detail.store(0), regions, eye_object, eye.w)
-    views = [View(eye, wall) for wall in walls] if parts else []
-    geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
-    faces = plan_faces(
-        geometry,
-        quality=settings.quality,
-        single_face_tangent=settings.single_face_tangent,
-        max_size=settings.max_intermediate,
-        intermediate_size=settings.intermediate_size,
-        previous=previous,
-    )
-    return geometry, parts, faces
-
-
-def _seen_parts(
-    store: RunStore, regions: Regions, eye_object: NDArray[np.float64], w: float
-) -> tuple[list[Part], NDArray[np.float64], NDArray[np.float64]]:
-    """The parts that are neither hidden nor transparent, front to back, and the object-space box of them."""
-    parts = shown_parts(regions, store.volume, np.append(eye_object, w))
-    visible = store.visible_box() if parts else None
-    low, high = visible or (np.full(3, np.inf), np.full(3, -np.inf))
-    parts = [part for part in parts if (part.low <= high).all() and (part.high >= low).all()]
-    if parts:
-        low = np.min([np.maximum(part.low, low) for part in parts], axis=0)
-        high = np.max([np.minimum(part.high, high) for part in parts], axis=0)
-    return parts, low, high
 
 
 def _composite(
@@ -109,6 +80,7 @@ def _composite(
     eye_object: NDArray[np.float64],
     face: Face,
     threads: int,
+    cancel: Cancel,
     out: Image,
 ) -> int:
     """Composite one part on one face behind what `out` holds; returns the samples taken."""
@@ -168,9 +140,11 @@ def _composite(
             table,
             np.float32(settings.residual),
             threads,
+            cancel.flag,
             samples,
             out,
         )
+        cancel.check()
         taken += int(samples.sum())
     return taken
 

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 from . import _jit
 from .arrays import Image
-from .compositor import composite_eye, plan_eye
+from .cancel import Cancel
+from .compositor import composite_eye
 from .eye_image import EyeImage
+from .geometry.faces import Face
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
 from .optics.classification import Classification
 from .optics.presets import choose
 from .optics.transfer import TransferFunction
+from .planning import EyePlan, plan_eye
 from .quality.features import SceneFeatures, features_of
 from .sampling import choose_sampling
 from .settings import Settings
@@ -99,29 +102,50 @@ class Renderer:
         self._classified += 1
         self.detail.classify(self._visibility(), self._stored())
 
-    def composite(self, eye: Eye, walls: Sequence[Wall], previous: EyeImage | None = None) -> EyeImage:
+    def composite(
+        self,
+        eye: Eye,
+        walls: Sequence[Wall],
+        previous: EyeImage | None = None,
+        cancel: Cancel | None = None,
+    ) -> EyeImage:
         """One eye image that serves all `walls`; the eye may be anywhere, inside the volume too.
 
         `previous`, this eye's image of the frame before, makes the choice of faces and pitch stay where it is
         while it serves about as well, so that an eye at rest between two choices does not flicker. Without it
         nothing depends on earlier frames.
 
+        `cancel`, asked in another thread, ends the work before the next row of pixels; the renderer, and
+        `last`, then are as before the call, but that what was encoded is kept. Encoding itself is not
+        cancelled: what has begun of it is waited for.
+
         Cost: one compositing, whatever the number of walls; none where no wall shows anything visible.
+
+        Raises
+        ------
+        Cancelled
+            By `cancel`; nothing of the image is left.
         """
-        if (self._skipping, self._packing) != (self.settings.skip_empty, self.settings.pack_runs):
-            self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
-            self.detail.classify(self._visibility(), self._stored())
+        return self._composite(lambda: self._plan(eye, walls, previous.faces if previous else ()), cancel)
+
+    def composite_plan(self, plan: EyePlan, cancel: Cancel | None = None) -> EyeImage:
+        """The eye image of a `plan`, at the present settings; all else as `composite`.
+
+        Where regions, transfer function or `Settings.single_face_tangent` have changed since, the eye is
+        planned anew.
+        """
+
+        def current() -> EyePlan:
+            self._keep_up()
+            fits = plan.fits(self.runs, self.regions, self.settings)
+            return plan if fits else self._plan(plan.eye, plan.walls, plan.previous)
+
+        return self._composite(current, cancel)
+
+    def _composite(self, plan: Callable[[], EyePlan], cancel: Cancel | None) -> EyeImage:
         compiled, encoded = _jit.compile_seconds(), self.detail.encode_seconds
         start = perf_counter()
-        image = composite_eye(
-            self.detail,
-            self._classification,
-            self.regions,
-            self.settings,
-            eye,
-            walls,
-            previous.faces if previous else (),
-        )
+        image = composite_eye(self.detail, self._classification, self.regions, self.settings, plan(), cancel)
         spent = perf_counter() - start
         compiled, encoded = _jit.compile_seconds() - compiled, self.detail.encode_seconds - encoded
         self.last = {
@@ -140,23 +164,40 @@ class Renderer:
         }
         return image
 
+    def plan(self, eye: Eye, walls: Sequence[Wall], previous: EyeImage | None = None) -> EyePlan:
+        """What `composite` finds out before the first pixel: which faces show what this eye sees.
+
+        Of the same parameters. It serves every quality, so a frame's plans are made once: `features_of_plans`
+        tells what they ask for, and `composite_plan` makes the images.
+        """
+        return self._plan(eye, walls, previous.faces if previous else ())
+
+    def _plan(self, eye: Eye, walls: Sequence[Wall], previous: Sequence[Face]) -> EyePlan:
+        self._keep_up()
+        return plan_eye(self.runs, self.regions, self.settings, eye, walls, previous)
+
     def features(
         self, eyes: Sequence[Eye], walls: Sequence[Wall], previous: Sequence[EyeImage | None] = ()
     ) -> SceneFeatures:
         """What a frame of these eyes will ask for, before it is drawn: what a `FrameTimeController` needs.
 
-        `previous`: the eyes' images of the frame before, which `composite` gets, too. Another transfer
-        function makes it another scene; other regions do not, for a clip plane may move in every frame. Cost:
-        planning each eye's faces, about 0.8 ms an eye and four walls, which `composite` does again.
+        `previous`: the eyes' images of the frame before, which `composite` gets, too. Where eyes have walls
+        of their own, or planning each eye twice, here and in `composite`, is too slow: `plan`.
         """
-        settings = replace(self.settings, quality=1.0, intermediate_size=None)
         before = [*previous, *[None] * (len(eyes) - len(previous))]
-        plans = []
-        for eye, image in zip(eyes, before, strict=True):
-            faces = image.faces if image else ()
-            geometry, _, planned = plan_eye(self.detail, self.regions, settings, eye, walls, faces)
-            plans.append((geometry, planned))
-        return features_of(plans, (id(self.volume), self._classified))
+        return self.features_of_plans(
+            self.plan(eye, walls, image) for eye, image in zip(eyes, before, strict=True)
+        )
+
+    def features_of_plans(self, plans: Iterable[EyePlan]) -> SceneFeatures:
+        """What a frame of these eyes' plans will ask for.
+
+        Another transfer function makes it another scene; other regions do not, for a clip plane may move in
+        every frame.
+        """
+        at_one = replace(self.settings, quality=1.0, intermediate_size=None)
+        planned = [(plan.geometry, plan.faces(at_one)) for plan in plans]
+        return features_of(planned, (id(self.volume), self._classified))
 
     def warp(self, eye_image: EyeImage, view: View, out: Image | Canvas | None = None) -> Image:
         """The picture of one view from an eye image; its wall must be one the eye image was made for.
@@ -169,8 +210,9 @@ class Renderer:
         image = warp_eye_image(eye_image, view, self.settings.threads, out)
         spent = perf_counter() - start
         compiled = _jit.compile_seconds() - compiled
-        self.last["warp_ms"] = self.last.get("warp_ms", 0.0) + 1e3 * max(spent - compiled, 0.0)
-        self.last["compile_ms"] = self.last.get("compile_ms", 0.0) + 1e3 * compiled
+        last = self.last  # another thread may composite meanwhile
+        last["warp_ms"] = last.get("warp_ms", 0.0) + 1e3 * max(spent - compiled, 0.0)
+        last["compile_ms"] = last.get("compile_ms", 0.0) + 1e3 * compiled
         return image
 
     def render(self, view: View, out: Image | Canvas | None = None) -> Image:
@@ -181,6 +223,12 @@ class Renderer:
         (height, width, 4) float32, linear, premultiplied, row 0 on top, no background.
         """
         return self.warp(self.composite(view.eye, [view.wall]), view, out)
+
+    def _keep_up(self) -> None:
+        """Drop what was encoded for other settings."""
+        if (self._skipping, self._packing) != (self.settings.skip_empty, self.settings.pack_runs):
+            self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
+            self.detail.classify(self._visibility(), self._stored())
 
     def _visibility(self) -> Classification | EverythingVisible:
         return self._classification if self.settings.skip_empty else EverythingVisible()

@@ -25,7 +25,7 @@ from .volume.levels import STANDARD_AXES
 def close_seams(faces: Sequence[Face], images: Sequence[Image]) -> None:
     """Give pixels of different faces that are the same ray the mean of their values, in place.
 
-    The faces share one pitch and have pixel centres at tangents of ±1, as `plan_faces` makes them.
+    The faces share one pitch and have pixel centres at tangents of ±1, as `faces_for` makes them.
     """
     corners = list(_corners(faces, images))
     for one, other in combinations(range(len(faces)), 2):

@@ -17,6 +17,7 @@ PACKAGE = ROOT / "persp_sw"
 RANKS = {
     "persp_sw.errors": 0,
     "persp_sw.arrays": 0,
+    "persp_sw.cancel": 0,
     "persp_sw._jit": 0,
     "persp_sw.settings": 1,
     "persp_sw.images": 1,
@@ -25,6 +26,7 @@ RANKS = {
     "persp_sw.optics": 2,
     "persp_sw.geometry": 2,
     "persp_sw.eye_image": 3,
+    "persp_sw.planning": 3,
     "persp_sw.sampling": 3,
     "persp_sw.seams": 3,
     "persp_sw.compositor": 3,

@@ -6,7 +6,7 @@ import twins
 from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import View, Volume, Wall
-from persp_sw.geometry.faces import EyeGeometry, plan_faces
+from persp_sw.geometry.faces import EyeGeometry, faces_for, needs_of
 from persp_sw.geometry.sight import Sights, tangents
 
 
@@ -17,7 +17,7 @@ def geometry_of(volume, *views):
 
 
 def plan(geometry, quality=1.0, single=3.0, max_size=4096):
-    return plan_faces(geometry, quality=quality, single_face_tangent=single, max_size=max_size)
+    return faces_for(needs_of(geometry, single), quality=quality, max_size=max_size)
 
 
 def empty_volume(size=(20, 30, 25), **pose):

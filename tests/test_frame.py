@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import persp_sw as psw
-from persp_sw import compositor
+from persp_sw.planning import EyePlan
 from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.cave.wall_pictures import SoftwareDrawer, TextureDrawer
 from vr_plugin.eyes import EyePair, before_wall, eyes_of_head
@@ -67,7 +67,7 @@ def test_shared_and_separate_compositings_are_the_same_bits(monkeypatch, head):
     assert frame.compositings == 2
     for picture in frame.pictures:
         # Faces, pitch and pixel grid pinned to the shared ones: what is left is whether walls matter.
-        monkeypatch.setattr(compositor, "plan_faces", lambda *_, p=picture, **__: list(p.image.faces))
+        monkeypatch.setattr(EyePlan, "faces", lambda *_, p=picture: list(p.image.faces))
         alone = maker.renderer.composite(picture.view.eye, [picture.view.wall])
         np.testing.assert_array_equal(
             maker.renderer.warp(alone, picture.view), maker.renderer.warp(picture.image, picture.view)

@@ -19,7 +19,7 @@ from persp_sw import (
     reference,
 )
 from persp_sw.errors import SceneError, ViewError
-from persp_sw.geometry.faces import EyeGeometry, plan_faces
+from persp_sw.geometry.faces import EyeGeometry, faces_for, needs_of
 from persp_sw.measure.exact import Slab
 from persp_sw.measure.metrics import psnr
 from persp_sw.optics.classification import Classification
@@ -39,7 +39,7 @@ def plan(volume, *views, quality=1.0, previous=()):
     inverse = np.linalg.inv(volume.world_from_object)
     eye = inverse[:3] @ (*views[0].eye.position, 0)
     geometry = EyeGeometry(eye, np.zeros(3), np.array(volume.size) - 1.0, views, inverse, 0.0, True)
-    return plan_faces(geometry, quality=quality, single_face_tangent=3, max_size=4096, previous=previous)
+    return faces_for(needs_of(geometry, 3, previous), quality=quality, max_size=4096, previous=previous)
 
 
 def poses(rng):

@@ -84,39 +84,43 @@ class Face:
         return max(least, 4 if self.steepest > 2 * STEEP else 2 if self.steepest > STEEP else 1)
 
 
-def plan_faces(
-    geometry: EyeGeometry,
-    *,
-    quality: float,
-    single_face_tangent: float,
-    max_size: int,
-    intermediate_size: int | None = None,
-    previous: Sequence[Face] = (),
-) -> list[Face]:
-    """The faces that hold a ray which meets the box and some wall's frustum; none if no ray does.
+def needs_of(geometry: EyeGeometry, single_face_tangent: float, previous: Sequence[Face] = ()) -> list[Need]:
+    """What the faces must cover that hold a ray which meets the box and some wall's frustum.
 
     One face serves while no such ray has a tangent beyond `single_face_tangent` in it, and while it takes not
     much more work, if the eye is close or inside, than several would; else several do, each limited to its
     own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
+
+    `previous` are the faces of the frame before, which are kept a little beyond the point where others would
+    be chosen, so that an eye at rest on that point does not make the picture flicker.
+    """
+    if not geometry.views:
+        return []
+    if geometry.at_infinity:
+        return _parallel_needs(geometry, previous)
+    return _needs(geometry, single_face_tangent, previous)
+
+
+def faces_for(
+    needs: Sequence[Need],
+    *,
+    quality: float,
+    max_size: int,
+    intermediate_size: int | None = None,
+    previous: Sequence[Face] = (),
+) -> list[Face]:
+    """The faces that cover the needs.
 
     Pixel centres lie at odd multiples of half the pitch. So a picture keeps its rays when its rectangle grows
     by a pixel, none of them lies in a slice or a side, where nobody can decide, and where several faces meet,
     at a tangent of ±1, both have pixels on the same rays: they share one pitch, 2 over an odd number.
 
     `intermediate_size` replaces `quality`: the largest face gets so many pixels on its longer side, or up to
-    four less, its width rounded up to a packet's 16. `previous` are the faces of the frame before, which are
-    kept a little beyond the point where others would be chosen, so that an eye at rest on that point does not
-    make the picture flicker.
+    four less, its width rounded up to a packet's 16. `previous`: as `needs_of`'s; their pitch is kept, too.
     """
-    if not geometry.views:
+    if not needs:
         return []
-    if geometry.at_infinity:
-        parts = _parallel_parts(geometry, previous)
-    else:
-        parts = _parts(geometry, single_face_tangent, previous)
-    if not parts:
-        return []
-    longest = max(part.longest for part in parts)
+    longest = max(need.longest for need in needs)
     most = max_size // TILE * TILE
     if intermediate_size:
         most = min(most, -(-intermediate_size // TILE) * TILE)
@@ -124,16 +128,16 @@ def plan_faces(
     else:
         # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made
         # of its own margins.
-        pitch = _common_pitch(parts) / quality
+        pitch = _common_pitch(needs) / quality
         pitch = min(pitch, longest / (TILE - _EXTRA) or pitch)
     pitch = max(pitch, longest / (most - _EXTRA))
-    if len(parts) > 1:
+    if len(needs) > 1:
         pitch = _seam_pitch(pitch, longest, most, previous, exact=bool(intermediate_size))
-    return [part.face(pitch, most) for part in parts]
+    return [need.face(pitch, most) for need in needs]
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class Need:
     """What one face must cover: a rectangle of tangents (of voxels, for an eye at infinity)."""
 
     axis: int
@@ -146,6 +150,7 @@ class _Part:
 
     @property
     def longest(self) -> float:
+        """The rectangle's longer side."""
         return float((self.high - self.low).max())
 
     @property
@@ -171,8 +176,8 @@ class _Part:
         return Face(self.axis, self.sign, origin, float(pitch), size, self.parallel)
 
 
-def _parallel_parts(geometry: EyeGeometry, previous: Sequence[Face]) -> list[_Part]:
-    """The one part that serves an eye at infinity; none where no wall shows the box."""
+def _parallel_needs(geometry: EyeGeometry, previous: Sequence[Face]) -> list[Need]:
+    """The one need that serves an eye at infinity; none where no wall shows the box."""
     before = previous[0] if len(previous) == 1 else None
     shear = Shear.along(-geometry.eye, _STAY, before and (before.axis, before.sign))
     sight = shear.sight(geometry)
@@ -180,45 +185,45 @@ def _parallel_parts(geometry: EyeGeometry, previous: Sequence[Face]) -> list[_Pa
         return []
     pitch = max(1.0, min(shear.pixel_size(geometry, view) for view in geometry.views))  # a pixel a voxel
     depth = geometry.high[shear.axis] - geometry.low[shear.axis]
-    return [_Part(shear.axis, shear.sign, sight.low, sight.high, depth, pitch, shear.tangents)]
+    return [Need(shear.axis, shear.sign, sight.low, sight.high, depth, pitch, shear.tangents)]
 
 
-def _parts(geometry: EyeGeometry, limit: float, previous: Sequence[Face]) -> list[_Part]:
-    """One part if one face can serve, else one for every pyramid that sees something.
+def _needs(geometry: EyeGeometry, limit: float, previous: Sequence[Face]) -> list[Need]:
+    """One need if one face can serve, else one for every pyramid that sees something.
 
     Close by and inside, where a rectangle is filled with what is seen, one face must not take much more work.
     """
     sights = Sights.of(geometry)
     single = _single_face(sights, limit, previous)
-    one = [] if single is None else _parts_of(geometry, sights, single)
+    one = [] if single is None else _needs_of_sights(geometry, sights, single)
     if one and not (geometry.inside or sights.whole(single).nearest < _CLOSE * one[0].depth):
         return one
-    several = _parts_of(geometry, sights, None)
+    several = _needs_of_sights(geometry, sights, None)
     worth = _WORTH * (_STAY if len(previous) == 1 else 1 / _STAY if previous else 1)
-    if one and one[0].work <= worth * sum(part.work for part in several):
+    if one and one[0].work <= worth * sum(need.work for need in several):
         return one
     return several
 
 
-def _parts_of(geometry: EyeGeometry, sights: Sights, only: int | None) -> list[_Part]:
-    """A part for each direction that sees something: `only` one, for all rays, or each for its own."""
+def _needs_of_sights(geometry: EyeGeometry, sights: Sights, only: int | None) -> list[Need]:
+    """A need for each direction that sees something: `only` one, for all rays, or each for its own."""
     pixels = sights.pixel_sizes(geometry, only)
     if only is None:
         shown = {direction: sights.own(direction) for direction in range(6)}
     else:
         shown = {only: sights.whole(only)}
     return [
-        _part(geometry, direction, sight, 1.0 if only is None else np.inf, pixels[direction])
+        _need(geometry, direction, sight, 1.0 if only is None else np.inf, pixels[direction])
         for direction, sight in shown.items()
         if sight is not None
     ]
 
 
-def _part(geometry: EyeGeometry, direction: int, sight: Sight, limit: float, pixel: float) -> _Part:
-    """The part of a face that holds the rays of a sight, as far as their tangents are below `limit`."""
+def _need(geometry: EyeGeometry, direction: int, sight: Sight, limit: float, pixel: float) -> Need:
+    """What a face must cover that holds the rays of a sight, as far as their tangents are below `limit`."""
     low, high = np.clip(sight.low, -limit, limit), np.clip(sight.high, -limit, limit)
     pitch = max(_volume_pitch(geometry, sight), pixel)
-    return _Part(direction // 2, 1 if direction % 2 else -1, low, high, sight.farthest, pitch)
+    return Need(direction // 2, 1 if direction % 2 else -1, low, high, sight.farthest, pitch)
 
 
 def _volume_pitch(geometry: EyeGeometry, sight: Sight) -> float:
@@ -250,12 +255,12 @@ def _single_face(sights: Sights, limit: float, previous: Sequence[Face]) -> int 
     return best
 
 
-def _common_pitch(parts: list[_Part]) -> float:
+def _common_pitch(needs: Sequence[Need]) -> float:
     """One pitch for all faces with the work of each face's own: Σ area · depth / pitch² is the same."""
-    if len(parts) == 1:
-        return parts[0].pitch
-    work = np.array([part.work for part in parts])
-    return float(np.sqrt((work * np.square([part.pitch for part in parts])).sum() / work.sum()))
+    if len(needs) == 1:
+        return needs[0].pitch
+    work = np.array([need.work for need in needs])
+    return float(np.sqrt((work * np.square([need.pitch for need in needs])).sum() / work.sum()))
 
 
 def _seam_pitch(pitch: float, longest: float, most: int, previous: Sequence[Face], *, exact: bool) -> float:

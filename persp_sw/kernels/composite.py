@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
+from .._jit import byte_now, inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
 from .encode import BLOCK, packed_position
 from .packet import SCRATCH, WINDOW, blend, sample
 from .scanline import (
@@ -376,7 +376,7 @@ def _composite_row(v, rays, per_interval, fine, coarse, table, residual, chunk, 
 
 
 @parallel_kernel
-def composite(rays, per_interval, fine, coarse, table, residual, workers, samples, out):
+def composite(rays, per_interval, fine, coarse, table, residual, workers, cancelled, samples, out):
     """Composite one face of an eye image behind what `out` already holds.
 
     Parameters
@@ -393,6 +393,9 @@ def composite(rays, per_interval, fine, coarse, table, residual, workers, sample
         A packet stops when all its pixels let through no more than this.
     workers
         Threads; scanlines are dealt to them in turn. The picture does not depend on it.
+    cancelled
+        uint8 (1,): as soon as another thread makes it other than 0, scanlines not yet begun are left as they
+        are.
     samples
         int64 (height,): overwritten with the samples taken in each scanline.
     out
@@ -404,6 +407,9 @@ def composite(rays, per_interval, fine, coarse, table, residual, workers, sample
         chunk = new_chunk(words)
         tiles = _new_tiles(out.shape[1] // TILE)
         for v in range(worker, out.shape[0], workers):
+            if byte_now(cancelled) != 0:
+                samples[v] = 0
+                continue
             samples[v] = _composite_row(
                 v, rays, per_interval, fine, coarse, table, residual, chunk, tiles, out
             )

@@ -131,6 +131,11 @@ class RunStore:
         self._axes.clear()
         self._box = None
 
+    @property
+    def visibility(self) -> Visibility:
+        """What can be seen; another object after each `classify`."""
+        return self._visibility
+
     def axis(self, axis: int, *, pairs: bool = False) -> AxisRuns:
         """Runs of principal axis 0 (x), 1 (y) or 2 (z), encoded now if need be.
 
