@@ -22,42 +22,14 @@ from pathlib import Path
 import numpy as np
 
 from persp_sw.measure.replay import Disturbance, RecordedScene, Rule, Trace, replay
-from persp_sw.quality.controller import Choice, FrameTimeController
-from persp_sw.quality.features import FrameCost, SceneFeatures
+from persp_sw.measure.rules import Fixed, OpenCover
+from persp_sw.quality.controller import FrameTimeController
 
 RECORDED = Path(__file__).with_name("recorded_costs.json")
 LIMITS = 0.25, 2.0
 RATE = 60.0
 HEAD = """                 within ±10 %      time / target        the same, no noise
   rule            all  clean   free    p50    p95    p99    p50    p95    p99  quality      step"""
-
-
-class Fixed:
-    """One quality always."""
-
-    def __init__(self, quality: float):
-        self.quality = quality
-
-    def next(self, features: SceneFeatures, measured: FrameCost | None = None) -> Choice:
-        """That quality."""
-        return Choice(self.quality, "", why="held")
-
-
-class OpenCover:
-    """After two frames in a row outside ±10 %: q += 0.3 · q · (fps − wanted) / wanted, within the limits."""
-
-    def __init__(self, target_ms: float, quality: float = 1.0):
-        self.target_ms, self.quality, self.misses = target_ms, quality, 0
-
-    def next(self, features: SceneFeatures, measured: FrameCost | None = None) -> Choice:
-        """The rule as its authors describe it."""
-        if measured is not None:
-            rate = self.target_ms / measured.ms  # fps over the wanted
-            self.misses = self.misses + 1 if abs(rate - 1) > 0.1 else 0
-            if self.misses >= 2:
-                self.quality = min(max(self.quality * (1 + 0.3 * (rate - 1)), LIMITS[0]), LIMITS[1])
-                self.misses = 0
-        return Choice(self.quality, "", why="")
 
 
 def row(name: str, trace: Trace, target: float, free: np.ndarray) -> str:
@@ -152,7 +124,7 @@ def main() -> None:
             print(HEAD)
             rules: dict[str, Rule] = {
                 "ours": ours(target),
-                "OpenCOVER's": OpenCover(target),
+                "OpenCOVER's": OpenCover(target, limits=LIMITS),
                 "fixed 1": Fixed(1.0),
             }
             for name, rule in rules.items():

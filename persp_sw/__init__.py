@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from .measure.trace import FrameRecord, TraceWriter
     from .optics.transfer import TransferFunction
     from .planning import EyePlan
-    from .quality.controller import FrameTimeController
+    from .quality.controller import Choice, FrameTimeController
     from .quality.features import FrameCost, SceneFeatures
     from .quality.ladder import Ladder
+    from .quality.rest import Refinement
     from .renderer import Renderer
     from .scene import Scene
     from .settings import Settings
@@ -36,6 +37,7 @@ __all__ = [
     "Cancel",
     "Cancelled",
     "Canvas",
+    "Choice",
     "Cut",
     "Eye",
     "EyeImage",
@@ -47,6 +49,7 @@ __all__ = [
     "Ladder",
     "OffscreenContext",
     "PerspSWError",
+    "Refinement",
     "Regions",
     "Renderer",
     "Scene",
@@ -69,6 +72,7 @@ _HOME = {
     "Cancel": ".cancel",
     "Cancelled": ".cancel",
     "Canvas": ".warp.canvas",
+    "Choice": ".quality.controller",
     "Cut": ".geometry.regions",
     "Eye": ".geometry.view",
     "EyeImage": ".eye_image",
@@ -80,6 +84,7 @@ _HOME = {
     "Ladder": ".quality.ladder",
     "OffscreenContext": ".warp.context",
     "PerspSWError": ".errors",
+    "Refinement": ".quality.rest",
     "Regions": ".geometry.regions",
     "Renderer": ".renderer",
     "Scene": ".scene",

@@ -216,7 +216,7 @@ def test_a_wand_moves_the_volume_clips_it_and_v_puts_it_back(files):
     assert 0 < count[1] < count[0]
     loop.put_back()
     np.testing.assert_array_equal(loop.maker.room_from_world, start)
-    assert len(loop.renderer.regions.clip) == 0
+    assert len(loop.regions.clip) == 0
     assert sum(s["samples"] for s in loop.frame(0.4).statistics.values()) > count[1]
 
 

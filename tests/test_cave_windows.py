@@ -17,6 +17,7 @@ from virtual_screen import SECONDS, Program, display, environment  # noqa: F401 
 
 import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
+from vr_plugin.cave.windows import QUALITY_STEP
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.frame import FrameMaker
 from vr_plugin.placement import room_from_world
@@ -100,11 +101,11 @@ class Cave(Program):
         self._process.send_signal(signal.SIGINT)
 
 
-def expected(files: Path, *, mono: bool = False) -> np.ndarray:
+def expected(files: Path, *, mono: bool = False, quality: float = 1.0) -> np.ndarray:
     """What both windows should show, by the software warp and numpy."""
     rig = load_rig(files / "rig.toml")
     scene = psw.Scene.of_file(files / "body.npy")
-    renderer = psw.Renderer(scene.volume, scene.transfer)
+    renderer = psw.Renderer(scene.volume, scene.transfer, psw.Settings(quality=quality))
     maker = FrameMaker(renderer, rig.walls, room_from_world(rig, scene.volume))
     head = rig.eyes.rest_pose
     modes = {"front": "mono", "side": "mono"} if mono else {}
@@ -124,11 +125,12 @@ def is_near(truth: np.ndarray) -> Callable[[np.ndarray], bool]:
     return lambda picture: bool(np.abs(picture.astype(int) - truth).max() <= SCREEN_STEPS)
 
 
-def test_walls_keys_and_a_clean_end(display, files):  # noqa: F811
+@pytest.mark.parametrize("options", [(), ("--in-turn",)], ids=["beside", "in turn"])
+def test_walls_keys_and_a_clean_end(display, files, options):  # noqa: F811
     stereo, mono = expected(files), expected(files, mono=True)
     assert np.abs(stereo.astype(int) - mono).max() > 40
     assert stereo[:, EDGE:].max() > 60  # the side wall shows some of it
-    with Cave(display, files, "--json") as cave:
+    with Cave(display, files, "--no-adapt", *options, "--json") as cave:
         cave.until(is_near(stereo))
         cave.focus("front")
         cave.hand("key", "m")
@@ -145,6 +147,28 @@ def test_walls_keys_and_a_clean_end(display, files):  # noqa: F811
     assert said["walls"] == ["front", "side"]
     assert said["compositings_per_frame"] == 2
     assert said["ms"] > 0 and said["composite_ms"] > 0 and said["swap_ms"] > 0
+
+
+def test_at_rest_the_walls_are_refined_to_full_quality_and_keys_hold_it(display, files):  # noqa: F811
+    full, held = expected(files, quality=2.0), expected(files, quality=2.0 / QUALITY_STEP**4)
+    assert np.abs(full.astype(int) - held).max() > 2 * SCREEN_STEPS
+    trace = files / "trace.jsonl"
+    with Cave(display, files, "--trace", str(trace), "--json") as cave:
+        cave.until(is_near(full))
+        cave.focus("front")
+        for _ in range(4):
+            cave.hand("key", "minus")
+        cave.until(is_near(held))
+        cave.hand("key", "0")
+        cave.until(is_near(full))
+        cave.hand("key", "Escape")
+        cave.leave()
+    header, *frames = map(json.loads, trace.read_text().splitlines())
+    assert header["max_quality"] == 2.0 and header["target_hz"] == 60.0
+    assert all(frame["target_ms"] == pytest.approx(1e3 / 60, abs=1e-3) for frame in frames)
+    assert any(frame.get("refined") for frame in frames)
+    assert {frame["why"] for frame in frames} >= {"held", "refined"}
+    assert max(frame["quality"] for frame in frames) == 2.0
 
 
 def test_so_many_frames_then_it_ends_by_itself(display, files):  # noqa: F811

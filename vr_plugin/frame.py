@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ import persp_sw as psw
 from persp_sw.errors import ViewError
 
 from .eyes import EyePair
+from .moment import Moment, Sight
 from .pose import Pose
 from .rig import RigWall
 from .stereo import eyes_of
@@ -40,28 +42,81 @@ class Picture:
 
 
 @dataclass(frozen=True, eq=False)
+class Made:
+    """How a frame came about.
+
+    Attributes
+    ----------
+    quality
+        That it was composited with.
+    choice
+        The frame-time controller's; None where settings are fixed.
+    cost
+        Of compositing and planning.
+    """
+
+    quality: float
+    choice: psw.Choice | None
+    cost: psw.FrameCost
+
+
+@dataclass(frozen=True, eq=False)
 class Frame:
     """All pictures of one moment: of one head pose, and of no other.
 
     Attributes
     ----------
+    moment
+        What it was composited for.
+    pictures
+        Of the walls; `seen_at` gives those of another moment.
     images
         Eye images by the eye's name, those of eyes that see nothing of the volume, without faces, included.
-    compositings
-        How many eye images show anything: those that cost something.
     statistics
         `Renderer.last` of each eye image.
-    edge_on
-        Names of walls in whose plane an eye lies, which can show it nothing.
+    made
+        None where nobody asked.
     """
 
-    head: Pose
-    eyes: EyePair
+    moment: Moment
     pictures: Sequence[Picture]
     images: Mapping[str, psw.EyeImage]
-    compositings: int
     statistics: Mapping[str, Mapping[str, object]]
-    edge_on: Sequence[str] = ()
+    made: Made | None = None
+
+    @property
+    def head(self) -> Pose:
+        """Whose moment it is of, in the room."""
+        return self.moment.head
+
+    @property
+    def eyes(self) -> EyePair:
+        """In the room."""
+        return self.moment.eyes
+
+    @property
+    def edge_on(self) -> Sequence[str]:
+        """Names of walls in whose plane an eye lies, which can show it nothing."""
+        return self.moment.edge_on
+
+    @property
+    def compositings(self) -> int:
+        """How many eye images show anything: those that cost something."""
+        return sum(bool(image.faces) for image in self.images.values())
+
+    def cost(self, planning_ms: float = 0.0) -> psw.FrameCost:
+        """What compositing took, all eyes together."""
+        each = self.statistics.values()
+        return psw.FrameCost(
+            sum(s["composite_ms"] for s in each),
+            sum(s["samples"] for s in each),
+            sum(len(image.pixels) for image in self.images.values()),
+            planning_ms,
+        )
+
+    def seen_at(self, moment: Moment) -> Sequence[Picture]:
+        """What walls show of these eye images at a later moment, when head or volume have moved."""
+        return pictures_of(moment, self.images)
 
 
 class FrameMaker:
@@ -96,7 +151,13 @@ class FrameMaker:
         self._metres = float(np.cbrt(abs(np.linalg.det(self._room_from_world[:3, :3]))))  # a world unit
 
     def make(self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE) -> Frame:
-        """Composite every eye once, for all the walls that show it.
+        """The frame of `moment`, composited."""
+        return self.composite(self.moment(head, eyes, near, modes))
+
+    def moment(
+        self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE, **more: Any
+    ) -> Moment:
+        """What each eye sees on which wall; no pixel yet.
 
         Parameters
         ----------
@@ -104,25 +165,54 @@ class FrameMaker:
             Metres before each eye in which nothing is shown.
         modes
             Stereo modes by wall name, where not the rig's own.
+        more
+            What else the moment knows: its regions, its stamp.
         """
-        pictures, images, statistics, edge_on = [], {}, {}, []
         shown = {wall.name: eyes_of(modes.get(wall.name, wall.stereo)) for wall in self.walls}
+        walls = [(wall, self._in_world(wall.in_room(head))) for wall in self.walls]
+        sights, edge_on = {}, []
         for name in dict.fromkeys(name for names in shown.values() for name in names):
             eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)
             views = []
-            for wall in self.walls:
+            for wall, in_world in walls:
                 if name in shown[wall.name]:
                     try:
-                        views.append((wall, psw.View(eye, self._in_world(wall.in_room(head)))))
+                        views.append((wall, psw.View(eye, in_world)))
                     except ViewError as error:
                         edge_on.append(wall.name)
                         self._say(wall.name, error)
-            image = self.renderer.composite(eye, [view.wall for _, view in views], self._previous.get(name))
-            images[name] = self._previous[name] = image
+            sights[name] = Sight(eye, tuple(views))
+        return Moment(
+            head, eyes, sights, edge_on=tuple(edge_on), room_from_world=self._room_from_world, **more
+        )
+
+    def plan(self, moment: Moment) -> dict[str, psw.EyePlan]:
+        """What compositing a moment will ask for, by the eye's name."""
+        return {
+            name: self.renderer.plan(sight.eye, sight.walls, self._previous.get(name))
+            for name, sight in moment.sights.items()
+        }
+
+    def composite(
+        self, moment: Moment, cancel: psw.Cancel | None = None, plans: Mapping[str, psw.EyePlan] | None = None
+    ) -> Frame:
+        """Composite every eye once, for all the walls that show it.
+
+        Raises
+        ------
+        Cancelled
+            `cancel` was, meanwhile.
+        """
+        images, statistics = {}, {}
+        for name, sight in moment.sights.items():
+            if plans is None:
+                before = self._previous.get(name)
+                images[name] = self.renderer.composite(sight.eye, sight.walls, before, cancel)
+            else:
+                images[name] = self.renderer.composite_plan(plans[name], cancel)
             statistics[name] = dict(self.renderer.last)
-            pictures += [Picture(wall, name, view, image) for wall, view in views]
-        count = sum(bool(image.faces) for image in images.values())
-        return Frame(head, eyes, tuple(pictures), images, count, statistics, tuple(edge_on))
+        self._previous.update(images)
+        return Frame(moment, pictures_of(moment, images), images, statistics)
 
     def _in_world(self, wall: psw.Wall) -> psw.Wall:
         corners = (self._point(c) for c in (wall.lower_left, wall.lower_right, wall.upper_left))
@@ -135,3 +225,13 @@ class FrameMaker:
         if wall not in self._said:
             self._said.add(wall)
             _log.warning("wall %r shows nothing while an eye is in its plane: %s", wall, error)
+
+
+def pictures_of(moment: Moment, images: Mapping[str, psw.EyeImage]) -> tuple[Picture, ...]:
+    """The pictures that the walls show of eye images; of eyes without one none."""
+    return tuple(
+        Picture(wall, name, view, images[name])
+        for name, sight in moment.sights.items()
+        if name in images
+        for wall, view in sight.views
+    )

@@ -14,8 +14,10 @@ import persp_sw as psw
 
 from .eyes import eyes_of_head
 from .frame import Frame, FrameMaker
+from .moment import Moment
 from .placement import room_from_world
 from .rig import Rig
+from .steady import Steady
 from .stereo import Stereo
 from .trackers import HeadFilter, NoTracker, OutsideWatch, Sample, Tracker, Wand, wand_sensor
 
@@ -28,9 +30,11 @@ class Loop:
     rig
         Walls of this machine, eyes, tracker.
     renderer
-        What is shown; its regions get the wand's clip plane.
+        What is shown.
     tracker
         As `open_tracker` makes it of the rig's, samples in room space; None: nothing tracks.
+    controller
+        Chooses each frame's quality; None: the renderer's settings always.
 
     Attributes
     ----------
@@ -42,11 +46,21 @@ class Loop:
         By wall name: how each wall shows the eyes now.
     outside
         Counts frames with an eye outside the walls.
+    steady
+        Composites the moments.
+    regions
+        What part of the volume is shown now: the scene's, and the wand's clip planes.
     frames, edge_on
-        Frames made, and in how many of them an eye lay in the plane of a wall.
+        Frames asked for, and in how many of those shown an eye lay in the plane of a wall.
     """
 
-    def __init__(self, rig: Rig, renderer: psw.Renderer, tracker: Tracker | None = None):
+    def __init__(
+        self,
+        rig: Rig,
+        renderer: psw.Renderer,
+        tracker: Tracker | None = None,
+        controller: psw.FrameTimeController | None = None,
+    ):
         self.rig, self.renderer = rig, renderer
         self.tracker = tracker or NoTracker()
         matrix = room_from_world(rig, renderer.volume)
@@ -59,27 +73,42 @@ class Loop:
         corners = rig.corners[[wall.fixed_to == "room" for wall in rig.walls]]
         self.outside = OutsideWatch(corners) if len(corners) else None
         self.frames = self.edge_on = 0
-        self._regions = renderer.regions
+        self.regions = self._regions = renderer.regions
+        self.steady = Steady(self.maker, controller)
 
     def frame(self, now: float, shown_at: float | None = None) -> Frame:
-        """The frame of the moment `shown_at` (seconds of the same clock; None: `now`).
+        """The frame of the moment `shown_at` (seconds of the same clock; None: `now`), composited now.
 
         One head pose is taken, once: no frame mixes two.
         """
+        self.poll(now)
+        moment = self.moment(now if shown_at is None else shown_at)
+        self.look(moment)
+        return self.steady.make(moment)
+
+    def poll(self, now: float) -> None:
+        """Take what the tracker and the wand say; once a frame of the display."""
+        self.frames += 1
         samples = self.tracker.poll(now)
         self.head.add(self._heads(samples))
         if self.wand is not None and self.wand.update(samples, now):
             self.maker.room_from_world = self.wand.room_from_world
             clip = (*self._regions.clip, *self.wand.clip_planes)
-            self.renderer.regions = replace(self._regions, clip=clip)
-        head = self.head.pose_at(now if shown_at is None else shown_at)
+            self.regions = replace(self._regions, clip=clip)
+
+    def moment(self, shown_at: float) -> Moment:
+        """What the eyes see at a time that may lie ahead: the head goes on as it moves."""
+        head = self.head.pose_at(shown_at)
         eyes = eyes_of_head(head, self.rig.eyes)
+        return self.maker.moment(
+            head, eyes, self.rig.eyes.near, self.modes, regions=self.regions, stamp=self.head.stamp
+        )
+
+    def look(self, moment: Moment) -> None:
+        """Count what is wrong with a moment that is shown: eyes outside the walls or in a wall's plane."""
         if self.outside is not None:
-            self.outside.look(eyes)
-        frame = self.maker.make(head, eyes, self.rig.eyes.near, self.modes)
-        self.frames += 1
-        self.edge_on += bool(frame.edge_on)
-        return frame
+            self.outside.look(moment.eyes)
+        self.edge_on += bool(moment.edge_on)
 
     @property
     def modes(self) -> Mapping[str, str]:
@@ -99,7 +128,7 @@ class Loop:
         if self.wand is not None:
             self.wand.reset()
         self.maker.room_from_world = room_from_world(self.rig, self.renderer.volume)
-        self.renderer.regions = self._regions
+        self.regions = self._regions
 
     def close(self) -> None:
         """Let go of the tracker."""

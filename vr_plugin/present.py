@@ -94,6 +94,10 @@ class Composer:
         _say_without_quad_buffers(MODES[instead])
         return instead
 
+    def finish(self) -> None:
+        """Wait until all that was asked of the current context is drawn."""
+        GL.glFinish()
+
     def compose(
         self,
         left: EyeTarget,

@@ -14,6 +14,8 @@ import persp_sw as psw
 
 from ..frame import Frame
 from ..loop import Loop
+from ..record import Times, record_of
+from ..shown import Shown
 from .wall_pictures import Drawer, Drawn
 
 
@@ -84,6 +86,7 @@ def run_offscreen(
     start_s: float = 0.0,
     separate: bool = False,
     each: Callable[[int, Frame, Drawn], None] = lambda number, frame, drawn: None,
+    trace: psw.TraceWriter | None = None,
     progress: Callable[[int, int, str], None] = lambda done, total, what: None,
 ) -> tuple[Costs, Frame, Drawn]:
     """Frame 0, which warms up, then `frames` timed ones, 1 / rate_hz seconds of the counted clock apart.
@@ -96,6 +99,8 @@ def run_offscreen(
         Also time each picture as a view of its own, software warp.
     each
         Gets every timed frame and its pictures, which are valid until it returns.
+    trace
+        Takes a record of each timed frame; its target is a period of `rate_hz`.
 
     Returns
     -------
@@ -104,15 +109,21 @@ def run_offscreen(
     costs = Costs()
     canvases: dict[tuple[str, str], psw.Canvas] = {}
     for number in range(frames + 1):
-        begin = perf_counter()
-        frame = loop.frame(start_s + number / rate_hz)
+        begin, now = perf_counter(), start_s + number / rate_hz
+        frame = loop.frame(now)
         drawn = drawer.draw(frame)
         ms = 1e3 * (perf_counter() - begin)
+        warp_ms = sum(drawn.warp_ms.values())
+        loop.steady.drawn(frame, drawn.upload_ms, warp_ms)
         for statistics in frame.statistics.values():
             costs.encode_ms += statistics["encode_ms"]
             costs.compile_ms += statistics["compile_ms"]
         if number:
             costs.add(frame, drawn, ms)
+            if trace is not None:
+                times = Times(now, now, drawn.upload_ms, warp_ms, 0.0, ms)
+                shown = Shown(frame, frame.moment)
+                trace.write(record_of(number - 1, shown, times, 1e3 / rate_hz, on_display=False))
             each(number, frame, drawn)
         if separate:
             spent = _separately(loop.renderer, frame, canvases)

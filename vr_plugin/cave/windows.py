@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
+from itertools import pairwise
 from statistics import median
 from typing import Any
 
 import persp_sw as psw
 
-from ..frame import Frame
+from ..beside import Beside
+from ..frame import Picture
 from ..loop import Loop
 from ..present import Composer
+from ..record import Times, record_of
 from ..screen.events import Event, Key, asks_to_end
 from ..screen.eye_target import EyeTarget
+from ..shown import InTurn, Source
 from ..trackers import MouseTracker
 from ..window import Window, Windows
 from .tracker_events import TrackerEvents
 
 QUALITY_STEP = 2**0.25
+_PATIENCE_S = 0.002
+_RECORDS = 1000
 
 
 class WallWindow:
@@ -36,10 +42,12 @@ class WallWindow:
         self.composer = Composer()
         self.targets = {}
 
-    def draw(self, frame: Frame, channels: Sequence[str], mode: str, warp: Any, background: Any) -> None:
-        """Draw a frame's pictures of this wall into the window, in its mode; not yet shown."""
+    def draw(
+        self, pictures: Sequence[Picture], channels: Sequence[str], mode: str, warp: Any, background: Any
+    ) -> None:
+        """Draw the pictures of this wall into the window, in its mode; not yet shown."""
         self.window.make_current()
-        views = {p.eye: p.view for p in frame.pictures if p.wall.name == self.rig_wall.name}
+        views = {p.eye: p.view for p in pictures if p.wall.name == self.rig_wall.name}
         for eye in dict.fromkeys(channels):
             target = self.targets.get(eye)
             if target is None:
@@ -67,22 +75,36 @@ class WindowLoop:
 
     Parameters
     ----------
+    source
+        Where frames come from: composited in turn with drawing, or beside it.
     background
         Linear colour behind the volume.
+    trace
+        Takes a record of each frame.
+
+    Attributes
+    ----------
+    records
+        Of the last frames.
+    frames, missed, compositings
+        Frames shown, refreshes missed, the most eye images composited for one frame.
     """
 
-    def __init__(self, loop: Loop, background: Sequence[float] = (0, 0, 0)):
-        self.loop, self.background = loop, background
+    def __init__(
+        self,
+        loop: Loop,
+        source: Source,
+        background: Sequence[float] = (0, 0, 0),
+        trace: psw.TraceWriter | None = None,
+    ):
+        self.loop, self.source, self.background, self.trace = loop, source, background, trace
         self.ended = False
-        self.frame_ms: list[float] = []
-        self.stages: dict[str, list[float]] = {
-            "composite_ms": [],
-            "upload_ms": [],
-            "warp_ms": [],
-            "swap_ms": [],
-        }
-        self.compositings = 0
-        self._quality = loop.renderer.settings.quality
+        self.records: deque[psw.FrameRecord] = deque(maxlen=_RECORDS)
+        self.frames = self.missed = self.compositings = 0
+        # Whoever asks what drawing takes has to wait for it: OpenGL draws while the program goes on.
+        self.timed = trace is not None or isinstance(source, InTurn)
+        self.target_ms = 1e3 / loop.rig.quality.target_hz
+        self._end_s: float | None = None
         walks = isinstance(loop.tracker, MouseTracker)
         self._events = TrackerEvents(loop.tracker) if walks else None
 
@@ -93,12 +115,10 @@ class WindowLoop:
             warp = psw.TextureWarp()
             try:
                 walls += [WallWindow(windows, self.loop, n) for n in range(len(self.loop.rig.walls))]
-                while not self.ended and (frames is None or len(self.frame_ms) < frames):
-                    start = time.perf_counter()
+                while not self.ended and (frames is None or self.frames < frames):
                     for event in windows.poll():
                         self.handle(event)
                     self._show(windows, walls, warp)
-                    self.frame_ms.append(1e3 * (time.perf_counter() - start))
             finally:
                 if walls:
                     walls[0].window.make_current()
@@ -123,64 +143,103 @@ class WindowLoop:
         elif key == "M":
             loop.toggle_mono()
         elif key in ("+", "=", "KP_ADD"):
-            self._set_quality(loop.renderer.settings.quality * QUALITY_STEP)
+            self._set_quality(QUALITY_STEP)
         elif key in ("-", "KP_SUBTRACT"):
-            self._set_quality(loop.renderer.settings.quality / QUALITY_STEP)
+            self._set_quality(1 / QUALITY_STEP)
         elif key == "0":
-            self._set_quality(self._quality)
+            loop.steady.release()
         elif key == "V":
             loop.put_back()
         else:
             return False
         return True
 
-    def _set_quality(self, quality: float) -> None:
-        limits = self.loop.rig.quality
-        quality = min(max(quality, limits.min_quality), max(limits.max_quality, self._quality))
-        self.loop.renderer.settings = replace(self.loop.renderer.settings, quality=quality)
+    def _set_quality(self, factor: float) -> None:
+        """Hold it by hand, from where it is."""
+        steady, limits = self.loop.steady, self.loop.rig.quality
+        quality = factor * (steady.held or self.loop.renderer.settings.quality)
+        steady.hold(min(max(quality, limits.min_quality), max(limits.max_quality, steady.base.quality)))
 
     def _show(self, windows: Windows, walls: Sequence[WallWindow], warp: Any) -> None:
-        now = time.monotonic()
-        frame = self.loop.frame(now, now + 1 / self.loop.rig.quality.target_hz)
-        self.compositings = max(self.compositings, frame.compositings)
-        self.stages["composite_ms"].append(sum(s["composite_ms"] for s in frame.statistics.values()))
-        clock = [time.perf_counter()]
+        begin = time.monotonic()
+        shown = self.source.show(begin)
+        if shown is None:  # the first frame is being composited
+            time.sleep(_PATIENCE_S)
+            return
+        clock = [time.monotonic()]
         drawn = [wall for wall in walls if wall.window.is_drawn]
-        if drawn:
+        if drawn and shown.is_new:
             drawn[0].window.make_current()
-            for eye, image in frame.images.items():
+            for eye, image in shown.frame.images.items():
                 warp.upload(image, eye)
-        clock.append(time.perf_counter())
+        clock.append(time.monotonic())
+        pictures = shown.pictures
         for wall in drawn:
             stereo = self.loop.stereo[wall.rig_wall.name]
-            wall.draw(frame, stereo.channels, stereo.shown_mode, warp, self.background)
-        clock.append(time.perf_counter())
+            wall.draw(pictures, stereo.channels, stereo.shown_mode, warp, self.background)
+            if self.timed:
+                wall.composer.finish()
+        clock.append(time.monotonic())
         windows.swap()
-        clock.append(time.perf_counter())
-        for name, begin, end in zip(("upload_ms", "warp_ms", "swap_ms"), clock, clock[1:], strict=False):
-            self.stages[name].append(1e3 * (end - begin))
+        clock.append(time.monotonic())
+        upload_ms, warp_ms, swap_ms = (1e3 * (end - start) for start, end in pairwise(clock))
+        self.source.drawn(shown, upload_ms, warp_ms, 0.0)  # a swap does nothing but wait
+        times = Times(
+            begin, clock[-1], upload_ms, warp_ms, swap_ms, 1e3 * (clock[-1] - (self._end_s or begin))
+        )
+        self._end_s = clock[-1]
+        record = record_of(self.frames, shown, times, self.target_ms, on_display=True)
+        self.records.append(record)
+        self.frames += 1
+        self.missed += record.missed
+        self.compositings = max(self.compositings, record.compositings)
+        if self.trace is not None:
+            self.trace.write(record)
 
 
 def run_windows(
-    loop: Loop, warp: str, background: Sequence[float], frames: int | None, title: str
+    loop: Loop,
+    warp: str,
+    background: Sequence[float],
+    frames: int | None,
+    *,
+    in_turn: bool = False,
+    trace: psw.TraceWriter | None = None,
 ) -> dict[str, Any]:
-    """Show a rig until the user ends it; medians of what frames cost, the first left out.
+    """Show a rig until the user ends it; medians of what the last frames cost.
 
-    OpenGL draws while the program goes on: what `warp_ms` has not, `swap_ms` waits for.
+    With neither `in_turn` nor `trace` OpenGL draws while the program goes on: what `warp_ms` has not,
+    `swap_ms` waits for.
+
+    Parameters
+    ----------
+    in_turn
+        Composite each frame before it is drawn, instead of beside the display.
     """
     if warp == "software":
         raise psw.PerspSWError("windows are drawn by OpenGL: leave --warp software out, or use --offscreen")
-    shown = WindowLoop(loop, background)
-    with suppress(KeyboardInterrupt):  # Ctrl-C in the terminal ends it as escape does
-        shown.run(frames)
-    times = shown.frame_ms[1:] or shown.frame_ms or [0.0]
+    period_s = 1 / loop.rig.quality.target_hz
+    source = InTurn(loop, period_s) if in_turn else Beside(loop, period_s)
+    shown = WindowLoop(loop, source, background, trace)
+    try:
+        with suppress(KeyboardInterrupt):  # Ctrl-C in the terminal ends it as escape does
+            shown.run(frames)
+    finally:
+        source.close()
+    records = list(shown.records)[1 if shown.frames <= _RECORDS else 0 :] or shown.records
     return {
         "warp": "texture",
         "walls": [wall.name for wall in loop.rig.walls],
-        "ms": median(times),
-        **{name: median(spent[1:] or spent or [0.0]) for name, spent in shown.stages.items()},
+        **{name: _median(records, name) for name in ("composite_ms", "upload_ms", "warp_ms", "swap_ms")},
+        "ms": _median(records, "frame_ms"),
         "compositings_per_frame": shown.compositings,
-        "timed_frames": len(times),
+        "timed_frames": len(records),
+        "missed_frames": shown.missed,
         "outside_frames": loop.outside.frames if loop.outside else 0,
         "edge_on_frames": loop.edge_on,
     }
+
+
+def _median(records: Sequence[psw.FrameRecord], name: str) -> float:
+    values = [value for record in records if (value := getattr(record, name)) is not None]
+    return median(values) if values else 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +21,8 @@ from persp_sw.commands.options import (
 from persp_sw.commands.output import numbers, print_facts, print_json, progress_bars
 
 if TYPE_CHECKING:
+    import persp_sw as psw
+
     from ..cave.offscreen import Costs
     from ..frame import Frame
     from ..loop import Loop
@@ -38,8 +41,12 @@ wall's picture comes from one eye image for each eye, whatever the number of wal
 \b
 Keys, with windows:
   Esc  end                 X  swap eyes              M  mono, and back
-  + −  quality             0  quality of the start   V  put the volume back
+  + −  hold quality        0  let quality go again   V  put the volume back
 A rig whose tracker is "mouse" moves the head by keys and mouse, too (persp-sw track --help).
+
+With windows, quality follows the frame time (target_hz, min_quality, max_quality of the
+rig's [quality]), and eye images are composited beside the display, which shows the newest one
+from where the head is now; while the head rests, they are refined to full quality.
 
 Offscreen, time is counted: frame i is at i / rate seconds of the recorded path, so a run can
 be repeated. A frame 0 warms up; what is written is the last frame, or every K-th (--every).
@@ -58,6 +65,15 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
 @click.option("--warp", type=click.Choice(["auto", "texture", "software"]), default="auto", show_default=True)
 @click.option("--separate", is_flag=True, help="Also time every picture as a view of its own.")
 @click.option("--reference", "judge", is_flag=True, help="Compare the last frame with the reference (slow).")
+@click.option(
+    "--adapt/--no-adapt",
+    default=None,
+    help="Quality follows the frame time, or stays at --quality; with windows it follows by default.",
+)
+@click.option("--in-turn", is_flag=True, help="Windows wait for compositing, instead of going on beside it.")
+@click.option(
+    "--trace", "trace_file", type=click.Path(), help="Record every frame; see persp-sw trace --help."
+)
 @click.option("--unit", metavar="mm|cm|m|in|ft", help="Of the lengths in another system's wall file.")
 @click.option("--machine", metavar="NAME", help="Whose walls to show, of a rig of several machines.")
 @click.option("--no-tracking", is_flag=True, help="The head rests, whatever the rig says.")
@@ -78,6 +94,9 @@ def cave(
     warp: str,
     separate: bool,
     judge: bool,
+    adapt: bool | None,
+    in_turn: bool,
+    trace_file: str | None,
     unit: str | None,
     machine: str | None,
     no_tracking: bool,
@@ -94,6 +113,7 @@ def cave(
 
     from ..formats.opening import open_rig
     from ..loop import Loop
+    from ..pacing import controller_for
     from ..rigs.one_machine import rig_on_machine
     from ..trackers import open_tracker
 
@@ -113,18 +133,22 @@ def cave(
             folder="." if recording else Path(rig).parent,
             start=0.0 if offscreen else None,
         )
-        loop = Loop(chosen, renderer, tracker)
+        rate = rate or chosen.quality.target_hz
+        adapts = not offscreen if adapt is None else adapt
+        controller = controller_for(renderer, chosen.quality, rate) if adapts else None
+        loop = Loop(chosen, renderer, tracker, controller)
         try:
-            if not offscreen:
-                from ..cave.windows import run_windows
+            with _trace(trace_file, chosen, scene, rate, settings) as trace:
+                if not offscreen:
+                    from ..cave.windows import run_windows
 
-                progress(1, 1, "starting")
-                values = run_windows(loop, warp, shown.background, frames, Path(scene).name)
-            else:
-                values = _offscreen(
-                    loop, chosen, warp, frames or 10, rate or chosen.quality.target_hz, start, every,
-                    separate, judge, folder, Path(scene).stem, shown.background, progress,
-                )  # fmt: skip
+                    progress(1, 1, "starting")
+                    values = run_windows(loop, warp, shown.background, frames, in_turn=in_turn, trace=trace)
+                else:
+                    values = _offscreen(
+                        loop, chosen, warp, frames or 10, rate, start, every,
+                        separate, judge, folder, Path(scene).stem, shown.background, trace, progress,
+                    )  # fmt: skip
         finally:
             loop.close()
     values = {"rig": chosen.name or Path(rig).stem, "scene": scene, **values}
@@ -132,6 +156,19 @@ def cave(
         print_json(values)
     else:
         _print(values)
+
+
+def _trace(
+    file: str | None, rig: Rig, scene: str, rate_hz: float, settings: psw.Settings
+) -> AbstractContextManager[psw.TraceWriter | None]:
+    """What takes the frames' records; nothing where nobody wants them."""
+    import persp_sw as psw
+
+    if file is None:
+        return nullcontext()
+    limits = {"min_quality": rig.quality.min_quality, "max_quality": rig.quality.max_quality}
+    header = {"rig": rig.name, "scene": scene, "target_hz": rate_hz, **limits, "settings": settings}
+    return psw.TraceWriter(file, header)
 
 
 def _offscreen(
@@ -147,6 +184,7 @@ def _offscreen(
     folder: Path,
     name: str,
     background: Sequence[float],
+    trace: psw.TraceWriter | None,
     progress: Any,
 ) -> dict[str, Any]:
     import persp_sw as psw
@@ -170,7 +208,7 @@ def _offscreen(
     try:
         costs, frame, drawn = cave_offscreen.run_offscreen(
             loop, chosen, frames, rate_hz=rate_hz, start_s=start_s, separate=separate, each=each,
-            progress=progress,
+            trace=trace, progress=progress,
         )  # fmt: skip
         written = write(drawn.pictures, None)
         sheet = psw.images.write_rgb(folder / f"{name}-sheet.png", contact_sheet(drawn.pictures, background))

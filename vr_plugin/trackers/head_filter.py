@@ -85,6 +85,11 @@ class HeadFilter:
         self._blend: TimedPose | None = None  # what was shown when the head was found elsewhere
         self._missed = False
 
+    @property
+    def stamp(self) -> float | None:
+        """When the newest sample that is believed was taken; None before the first."""
+        return self._track[-1].stamp if self._track else None
+
     def add(self, samples: Iterable[Sample]) -> None:
         """Take samples in room space; those of other sensors and kinds are ignored."""
         for sample in samples:

@@ -1,0 +1,74 @@
+"""What a frame's record says of a frame that was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import NamedTuple
+
+import persp_sw as psw
+
+from .pose import Pose
+from .shown import Shown
+
+# Part of a period that a frame may be late and still be in time: displays queue a frame or two.
+_LATE = 0.1
+
+
+class Times(NamedTuple):
+    """When and how long, by the loop's clock: seconds; the stages in milliseconds."""
+
+    begin_s: float
+    end_s: float
+    upload_ms: float
+    warp_ms: float
+    swap_ms: float
+    frame_ms: float
+
+
+def record_of(
+    number: int, shown: Shown, times: Times, target_ms: float, *, on_display: bool
+) -> psw.FrameRecord:
+    """The record of frame `number`.
+
+    Parameters
+    ----------
+    on_display
+        Whether it was swapped to a screen; else nobody saw it, and no latency is known.
+    """
+    frame, made = shown.frame, shown.frame.made
+    choice = made.choice if made else None
+    cost = made.cost if made and shown.is_new else None
+    stamp = shown.moment.stamp
+    refined = choice is not None and choice.why == "refined"
+    return psw.FrameRecord(
+        number,
+        times.begin_s,
+        shown_s=times.end_s if on_display else None,
+        head=_numbers(frame.head),
+        shown_head=None if shown.moment is frame.moment else _numbers(shown.moment.head),
+        target_ms=target_ms,
+        budget_ms=choice.budget_ms if choice else None,
+        quality=made.quality if made else None,
+        rung=choice.rung if choice else "",
+        why=choice.why if choice else "",
+        expected_ms=choice.expected_ms if choice else None,
+        composite_ms=cost.ms if cost else None,
+        planning_ms=cost.planning_ms if cost else None,
+        upload_ms=times.upload_ms,
+        warp_ms=times.warp_ms,
+        swap_ms=times.swap_ms,
+        frame_ms=times.frame_ms,
+        missed=max(ceil(times.frame_ms / target_ms - _LATE) - 1, 0),
+        latency_ms=1e3 * (times.end_s - stamp) if on_display and stamp is not None else None,
+        samples=int(cost.samples) if cost else None,
+        pixels=int(cost.pixels) if cost else None,
+        faces=sum(len(image.faces) for image in frame.images.values()),
+        compositings=frame.compositings if shown.is_new else 0,
+        rewarped=shown.moment is not frame.moment,
+        refined=refined,
+    )
+
+
+def _numbers(pose: Pose) -> Sequence[float]:
+    return (*pose.position.tolist(), *pose.orientation.tolist())

@@ -1,0 +1,93 @@
+"""Frames that keep to their time: composited as a frame-time controller chooses, or refined at rest."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from time import perf_counter
+
+import persp_sw as psw
+
+from .frame import Frame, FrameMaker, Made
+from .moment import Moment
+
+
+class Steady:
+    """Composites moments one after another, in whatever thread calls it, one at a time.
+
+    Parameters
+    ----------
+    maker
+        Its renderer's settings are the user's; a controller's choices are laid over them.
+    controller
+        A `FrameTimeController`, or another rule with its `next`. None: every frame with those settings.
+
+    Attributes
+    ----------
+    base
+        The user's settings, which may be assigned at any time.
+    held
+        Quality held by hand; None where it is free, or as in `base`.
+    refinement
+        Of a resting viewer's pictures; None: rest changes nothing.
+    """
+
+    def __init__(self, maker: FrameMaker, controller: psw.FrameTimeController | None = None):
+        self.maker, self.controller = maker, controller
+        self.base = maker.renderer.settings
+        self.held: float | None = None
+        self.refinement: psw.Refinement | None = None
+        # A frame whose upload, warp and swap are still to come, and one whose are known.
+        self._drawn: Frame | None = None
+        self._finished: deque[tuple[psw.FrameCost, psw.Choice]] = deque(maxlen=1)
+
+    def hold(self, quality: float) -> None:
+        """Every frame with this quality, at rest, too."""
+        if self.controller is not None:
+            self.controller.hold(quality)
+        self.held = quality
+
+    def release(self) -> None:
+        """Quality is free again; without a controller as the user set it."""
+        if self.controller is not None:
+            self.controller.release()
+        self.held = None
+
+    def make(self, moment: Moment, cancel: psw.Cancel | None = None, resting: bool = False) -> Frame:
+        """The frame of a moment.
+
+        Parameters
+        ----------
+        resting
+            Nothing moves: take more time than a frame has, step by step up to full quality.
+
+        Raises
+        ------
+        Cancelled
+            `cancel` was, meanwhile; the next frame goes on as if this one had not been asked for.
+        """
+        renderer = self.maker.renderer
+        if moment.regions is not None and moment.regions is not renderer.regions:
+            renderer.regions = moment.regions
+        if self.controller is None:
+            quality = self.held or self.base.quality
+            renderer.settings = replace(self.base, quality=quality)
+            frame = self.maker.composite(moment, cancel)
+            return replace(frame, made=Made(quality, None, frame.cost()))
+        start = perf_counter()
+        plans = self.maker.plan(moment)
+        features = renderer.features_of_plans(plans.values())
+        measured, of = self._finished.pop() if self._finished else (None, None)
+        choice = self.controller.next(features, measured, of)
+        if self.refinement is not None:
+            choice = self.refinement.next(choice, resting)
+        renderer.settings = choice.apply(self.base)
+        planning_ms = 1e3 * (perf_counter() - start)
+        frame = self.maker.composite(moment, cancel, plans)
+        return replace(frame, made=Made(choice.quality, choice, frame.cost(planning_ms)))
+
+    def drawn(self, frame: Frame, upload_ms: float = 0.0, warp_ms: float = 0.0, swap_ms: float = 0.0) -> None:
+        """What a frame took besides; the times that the same core cannot composite in."""
+        if frame.made is not None and frame.made.choice is not None:
+            cost = replace(frame.made.cost, upload_ms=upload_ms, warp_ms=warp_ms, swap_ms=swap_ms)
+            self._finished.append((cost, frame.made.choice))
