@@ -43,7 +43,7 @@ RANKS = {
 }
 # The same for the plug-in: a package or module sees itself and those of lower rank.
 VR_RANKS = {
-    "pose": 0, "stereo": 0,
+    "pose": 0, "stereo": 0, "worker": 0,
     "rig": 1, "projection": 1,
     "eyes": 2, "placement": 2, "screen": 2,
     "cameras": 3, "rigs": 3, "trackers": 3, "moment": 3, "present": 3, "window": 3, "host_view": 3,

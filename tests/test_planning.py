@@ -38,6 +38,22 @@ def test_one_plan_serves_every_quality(eye):
             assert renderer.features_of_plans([plan]) == renderer.features([eye], walls, [previous])
 
 
+def test_a_plan_keeps_the_pitch_of_the_frame_before():
+    # Pitches come in steps, which are below 10 %, what a pitch is kept for, where faces are large.
+    renderer, walls = psw.Renderer(placed(synthetic_ct(64)), FOG, psw.Settings(quality=8)), four_walls(64)
+    before = renderer.composite(EYES[2], walls)
+    plan, free = renderer.plan(EYES[2], walls, before), renderer.plan(EYES[2], walls)
+    kept = []
+    for quality in np.linspace(7, 8, 11):
+        settings = psw.Settings(quality=quality)
+        if (faces := plan.faces(settings)) != free.faces(settings):
+            assert faces == list(before.faces)
+            kept.append(quality)
+    assert kept
+    renderer.settings = psw.Settings(quality=kept[0])
+    assert_same(renderer.composite_plan(plan), renderer.composite(EYES[2], walls, before))
+
+
 def test_a_frame_plans_each_eye_once(monkeypatch):
     planned = []
     needs_of = planning.needs_of
@@ -66,9 +82,9 @@ def test_a_plan_that_is_out_of_date_is_made_anew(change):
     plan = renderer.plan(eye, walls)
     old = renderer.composite_plan(plan)
     change(renderer)
-    fresh = renderer.composite(eye, walls)
+    new, fresh = renderer.composite_plan(plan), renderer.composite(eye, walls)
     assert old.faces != fresh.faces  # else the test could not fail
-    assert_same(renderer.composite_plan(plan), fresh)
+    assert_same(new, fresh)
 
 
 def test_a_plan_of_an_eye_that_sees_nothing():
