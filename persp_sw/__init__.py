@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .geometry.regions import Cut, Regions
     from .geometry.view import Eye, View, Wall
     from .measure.trace import FrameRecord, TraceWriter
+    from .measure.trace_reading import read_trace
     from .optics.transfer import TransferFunction
     from .planning import EyePlan
     from .quality.controller import Choice, FrameTimeController
@@ -64,6 +65,7 @@ __all__ = [
     "__version__",
     "images",
     "load",
+    "read_trace",
     "reference",
 ]
 __version__ = "0.1.0"
@@ -97,6 +99,7 @@ _HOME = {
     "Volume": ".volume.grid",
     "Wall": ".geometry.view",
     "load": ".volume.files",
+    "read_trace": ".measure.trace_reading",
 }
 
 

@@ -35,6 +35,7 @@ _OWN = {
         "Measure time, work, memory and error, beside other renderers.",
     ),
     "chart": ("persp_sw.commands.chart:chart", "Draw time against accuracy, for all ways to sample."),
+    "trace": ("persp_sw.commands.trace:trace", "Tell how steady a recorded session was, and draw it."),
     "papers": (
         "persp_sw.commands.papers:papers",
         "Repeat a paper's own experiments, beside what it prints.",

@@ -207,3 +207,8 @@ QUADS = 2e-3
 # An sRGB picture of bytes: rounded when the scene is written, half a step, of which (1 − α) is let through
 # and made up to twice as many by the curve, where light is low; and rounded again.
 CPP_BYTES = 1.5
+
+# --- Traces ------------------------------------------------------------------------------------------------
+
+# Milliseconds made of two times that a trace keeps to 0.5 µs each; those it keeps as such are nearer.
+TRACE_DECIMALS = 2 * 0.5e-3
