@@ -25,6 +25,7 @@ from .planning import EyePlan
 from .sampling import Sampling, choose_sampling
 from .seams import close_seams
 from .settings import Settings
+from .slabs import in_slabs, placed
 from .volume.detail import DetailStore
 from .volume.levels import STANDARD_AXES
 
@@ -59,15 +60,25 @@ def composite_eye(
     )
     images = [image.face_pixels(number) for number in range(len(faces))]
     sampling = choose_sampling(settings, classification, volume)
-    samples = sum(
-        _composite(
-            detail, classification, part, settings, sampling, eye, geometry.eye, face, threads, cancel, out
-        )
-        for face, out in zip(faces, images, strict=True)
-        for part in plan.parts
-    )
+
+    def between(faces: Sequence[Face], images: Sequence[Image], nearest: float, farthest: float) -> int:
+        limits = nearest, farthest
+        return sum(
+            _composite(
+                detail, classification, part, settings, sampling, eye, geometry.eye, face, threads, limits,
+                cancel, out,
+            )
+            for face, out in zip(faces, images, strict=True)
+            for part in plan.parts
+        )  # fmt: skip
+
+    if faces and settings.depth_slabs and not eye.is_at_infinity:
+        if settings.depth_slabs > 1:
+            return in_slabs(image, settings.depth_slabs, settings.residual, between)
+        image = placed(image, between)
+    samples = between(faces, images, 0.0, np.inf)
     close_seams(faces, images)
-    return replace(image, samples=samples)
+    return replace(image, samples=image.samples + samples)
 
 
 def _composite(
@@ -80,10 +91,11 @@ def _composite(
     eye_object: NDArray[np.float64],
     face: Face,
     threads: int,
+    between: tuple[float, float],
     cancel: Cancel,
     out: Image,
 ) -> int:
-    """Composite one part on one face behind what `out` holds; returns the samples taken."""
+    """Composite one part on one face, between two distances, behind what `out` holds; returns the samples."""
     volume = detail.volume
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
@@ -119,11 +131,12 @@ def _composite(
     taken = 0
     _jit.set_threads(threads)
     for zone in detail_zones(pitch, offset_pitch, back, len(detail) if settings.level_of_detail else 1):
-        if zone.far <= front:
+        near, far = max(zone.near, between[0]), min(zone.far, between[1])
+        if far <= max(front, near):
             continue
         # Distances along the axis as half-spaces: D ≥ near and D ≤ far.
-        limits = [(0, 0, face.sign, -face.sign * k_0 - zone.near)] * (zone.near > 0)
-        limits += [(0, 0, -face.sign, face.sign * k_0 + zone.far)] * (zone.far < np.inf)
+        limits = [(0, 0, face.sign, -face.sign * k_0 - near)] * (near > 0)
+        limits += [(0, 0, -face.sign, face.sign * k_0 + far)] * (far < np.inf)
         levels = [zone.fine, zone.fine + any(zone.share)]
         fine, coarse = (_level(detail, number, face.axis, low, high, pairs) for number in levels)
         composite_face(
@@ -131,7 +144,7 @@ def _composite(
                 geometry,
                 linear.T @ linear,
                 np.array([*half_spaces, *limits], np.float64),
-                np.array([zone.near, zone.far]),
+                np.array([near, far]),
                 np.array(zone.share),
             ),
             per_interval,

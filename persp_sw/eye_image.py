@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 from zipfile import BadZipFile
 
@@ -38,6 +38,13 @@ class EyeImage:
     half_spaces
         (n, 4) rows, object space: all that can be seen lies where a·p + a_0 ≥ 0, too. Box and half-spaces
         tell where on a ray its colour comes from, which a scene with a depth buffer asks.
+    depth
+        Where its colours lie: the distance, in voxels along a face's axis and the same for all faces, at
+        which eyes that have moved since see it best. None: not measured; the middle of `box` serves.
+    slabs
+        The same in pieces, front to back, each between two distances and with its own `depth`: what moved
+        eyes are shown, with parallax. They differ from the image in `pixels` and `depth` only. Empty: the
+        image itself serves them.
     """
 
     eye: Eye
@@ -47,6 +54,8 @@ class EyeImage:
     samples: int
     box: NDArray[np.float64] = field(default_factory=lambda: np.array([[-np.inf] * 3, [np.inf] * 3]))
     half_spaces: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+    depth: float | None = None
+    slabs: tuple[EyeImage, ...] = ()
 
     def offset(self, number: int) -> int:
         """Where face `number` begins in `pixels`."""
@@ -88,6 +97,7 @@ class EyeImage:
         """Everything, for another process or machine; `from_bytes` gives it back bit for bit."""
         nowhere = (np.nan, np.nan)
         table = [(f.axis, f.sign, *f.origin, f.pitch, *f.size, *(f.parallel or nowhere)) for f in self.faces]
+        shape = len(self.slabs), *self.pixels.shape
         buffer = io.BytesIO()
         np.savez(
             buffer,
@@ -98,6 +108,8 @@ class EyeImage:
             samples=np.int64(self.samples),
             box=self.box,
             half_spaces=self.half_spaces,
+            depths=np.array([np.nan if i.depth is None else i.depth for i in (self, *self.slabs)]),
+            slabs=np.array([slab.pixels for slab in self.slabs], np.float32).reshape(shape),
         )
         return buffer.getvalue()
 
@@ -106,14 +118,15 @@ class EyeImage:
         """Inverse of `to_bytes`; ViewError if the bytes are something else."""
         try:
             with np.load(io.BytesIO(data), allow_pickle=False) as file:
-                names = ("eye", "world_from_object", "faces", "pixels", "samples", "box", "half_spaces")
-                content = {name: file[name] for name in names}
+                content = {name: file[name] for name in _CONTENT}
             shapes = {name: array.shape for name, array in content.items()}
-            pixels = content["pixels"]
+            pixels, slabs = content["pixels"], content["slabs"]
             wanted = {"eye": (5,), "world_from_object": (4, 4), "samples": (), "box": (2, 3)}
             planes = content["half_spaces"]
             fits = all(shapes[name] == shape for name, shape in wanted.items())
             fits = fits and planes.ndim == 2 and planes.shape[1] == 4
+            fits = fits and slabs.shape == (len(slabs), *pixels.shape) and slabs.dtype == np.float32
+            fits = fits and shapes["depths"] == (1 + len(slabs),)
             if not (fits and pixels.ndim == 2 and pixels.shape[1] == 4 and pixels.dtype == np.float32):
                 raise ValueError(f"its arrays have the shapes {shapes}")
             faces = tuple(_face(*row) for row in content["faces"].tolist())
@@ -124,12 +137,22 @@ class EyeImage:
                 raise ValueError("its faces are another eye's")
             if np.isnan(content["box"]).any() or not np.isfinite(planes).all():
                 raise ValueError("its box or half-spaces are no numbers")
-            image = cls(eye, content["world_from_object"], faces, pixels, samples, content["box"], planes)
+            depth, *depths = (None if np.isnan(d) else d for d in content["depths"].tolist())
+            if not all(d is None or 0 < d < np.inf for d in (depth, *depths)):
+                raise ValueError("it lies at impossible depths")
+            image = cls(
+                eye, content["world_from_object"], faces, pixels, samples, content["box"], planes, depth
+            )
+            layers = (replace(image, pixels=p, depth=d) for p, d in zip(slabs, depths, strict=True))
+            image = replace(image, slabs=tuple(layers))
         except (OSError, EOFError, ValueError, TypeError, KeyError, OverflowError, BadZipFile) as error:
             raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
         if image.offset(len(faces)) != len(pixels):
             raise ViewError("this eye image's faces do not fit its pixels; it was damaged on the way")
         return image
+
+
+_CONTENT = "eye", "world_from_object", "faces", "pixels", "samples", "box", "half_spaces", "depths", "slabs"
 
 
 def _face(axis, sign, t_i, t_j, pitch, width, height, parallel_i, parallel_j) -> Face:

@@ -41,6 +41,10 @@ class Settings:
         None: as `quality` says.
     max_intermediate
         Largest width and height of a face, pixels.
+    depth_slabs
+        What eye images carry for eyes that have moved since, 0 … 8. 0: nothing, they lie in the middle of
+        what is shown. 1: the distance at which their colours lie, measured by a coarse image. 2 or more: as
+        many slabs, each at its own distance. See `docs/rewarp.md`. For an eye at infinity: 0.
     threads
         Threads to composite and warp with; None: all cores.
 
@@ -60,6 +64,7 @@ class Settings:
     pack_runs: bool = True
     max_intermediate: int = 4096
     intermediate_size: int | None = None
+    depth_slabs: int = 0
     threads: int | None = None
 
     def __post_init__(self):
@@ -68,6 +73,8 @@ class Settings:
         number(self.single_face_tangent, "single_face_tangent", SettingsError, 1, 8)
         number(self.max_intermediate, "max_intermediate", SettingsError, 16, 16384)
         self._check_whole("max_intermediate")
+        number(self.depth_slabs, "depth_slabs", SettingsError, 0, 8)
+        self._check_whole("depth_slabs")
         if self.intermediate_size is not None:
             number(self.intermediate_size, "intermediate_size", SettingsError, 16, self.max_intermediate)
             self._check_whole("intermediate_size")

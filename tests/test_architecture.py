@@ -29,6 +29,7 @@ RANKS = {
     "persp_sw.planning": 3,
     "persp_sw.sampling": 3,
     "persp_sw.seams": 3,
+    "persp_sw.slabs": 3,
     "persp_sw.compositor": 3,
     "persp_sw.warp": 3,
     "persp_sw.quality": 3,

@@ -1,6 +1,7 @@
 """Eye images travel as bytes, and tell where their faces lie."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -32,6 +33,18 @@ def test_bytes_round_trip_bit_for_bit(image):
     np.testing.assert_array_equal(other.pixels, image.pixels)
     np.testing.assert_array_equal(other.box, image.box)
     np.testing.assert_array_equal(other.half_spaces, image.half_spaces)
+    assert other.depth is None and other.slabs == ()
+
+
+def test_depth_and_slabs_travel_too(image):
+    slabs = tuple(replace(image, pixels=image.pixels * factor, depth=4 + factor) for factor in (1, 2, 3))
+    image = replace(image, depth=7.25, slabs=slabs)
+    other = EyeImage.from_bytes(image.to_bytes())
+    assert other.depth == 7.25 and [slab.depth for slab in other.slabs] == [5, 6, 7]
+    for slab, given in zip(other.slabs, slabs, strict=True):
+        np.testing.assert_array_equal(slab.pixels, given.pixels)
+        np.testing.assert_array_equal(slab.box, image.box)
+        assert slab.faces == image.faces and slab.slabs == ()
 
 
 def test_an_eye_image_without_faces_travels_too(image):
@@ -83,6 +96,8 @@ GOOD = {
     "samples": np.int64(0),
     "box": np.array([[0, 0, 0], [1, 1, 1.0]]),
     "half_spaces": np.zeros((0, 4)),
+    "depths": np.array([NOWHERE, 3.0]),
+    "slabs": np.zeros((1, 4, 4), np.float32),
 }
 
 
@@ -106,6 +121,11 @@ GOOD = {
         {"box": np.full((2, 3), np.nan)},
         {"half_spaces": np.zeros((2, 3))},
         {"half_spaces": np.full((1, 4), np.inf)},
+        {"depths": np.array([NOWHERE])},
+        {"depths": np.array([NOWHERE, 0.0])},
+        {"depths": np.array([np.inf, 1.0])},
+        {"slabs": np.zeros((1, 4, 4))},
+        {"slabs": np.zeros((1, 3, 4), np.float32)},
     ],
 )
 def test_impossible_contents_are_refused(change):

@@ -606,16 +606,16 @@ def test_a_slot_for_each_eye_and_its_memory_used_again(warp, volume):
     for name, view, (_, truth) in zip("ab", views, made, strict=True):
         picture = drawn(lambda v=view, n=name: warp.draw_view(v, n), view.size)
         assert np.abs(picture - truth).max() < TEXTURE_FLOAT32
-    texture = warp._slots["a"].texture
+    texture = warp._slots["a"].textures[0]
     for towards in (*DIRECTIONS, DIRECTIONS[0]):
         view = view_of(volume, towards, 1.7, fovy=60, size=(64, 48))
         image, truth = pictures(volume, view)
         warp.upload(image, "a")
         assert np.abs(drawn(lambda v=view: warp.draw_view(v, "a"), view.size) - truth).max() < TEXTURE_FLOAT32
     warp.upload(made[0][0], "a")
-    again = warp._slots["a"].texture
+    again = warp._slots["a"].textures[0]
     warp.upload(made[0][0], "a")
-    assert warp._slots["a"].texture is again
+    assert warp._slots["a"].textures[0] is again
     assert texture.precision == "float32"
 
 

@@ -2,8 +2,7 @@
 
 A face is a rectangle in a plane of slices at any distance D from the eye (DESIGN section 3). An ordinary
 matrix clip_from_world shows it; drawn for the eye that the image was made for, the picture is the same for
-every D. Only an eye that has moved since sees the plane itself; then it is best at the harmonic mean of the
-nearest and the farthest depth.
+every D. Only an eye that has moved since sees the plane itself; see `moved`.
 
 A quad is not handed to OpenGL as such, for the near and far planes of a wall would clip it, and clipped quads
 of several faces may crack. Instead the quads are clipped to the window here, in float64, and the shader gets
@@ -21,14 +20,16 @@ from ..arrays import Matrix
 from ..errors import ViewError
 from ..eye_image import EyeImage
 from ..geometry.faces import Face
+from ..geometry.placement import beyond_eye
 from ..volume.levels import STANDARD_AXES
+from .moved import distance_of, shift_of
 
 Array = NDArray[np.float64]
 
 # Inside a window where |x| ≤ w and |y| ≤ w, which implies w ≥ 0: rows · (x, y, w) ≥ 0.
 _WINDOW = np.array([[1, 0, 1], [-1, 0, 1], [0, 1, 1], [0, -1, 1.0]])
-# A quad's distance is never below this part of the farthest depth: from inside, the harmonic mean is 0.
-_NEAREST = 1 / 8
+# Rows (x, y, w) of a matrix are those of parallel rays if so nearly dependent.
+_PARALLEL = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +78,26 @@ class Quads:
         self.middles = np.array([_middle(face) for face in faces]).reshape(-1, 2)
         self.start_from_face = np.array([_start(face) for face in faces]).reshape(-1, 3, 3)
         self.object_from_face = np.array([_direction(face) for face in faces]).reshape(-1, 3, 3)
-        linear = pose[:3, :3]
-        distance = self._distance()
-        points = self.start_from_face + distance * self.object_from_face
-        self._world_from_face = np.zeros((len(faces), 4, 3))
-        self._world_from_face[:, :3] = linear @ points
-        self._world_from_face[:, :3, 2] += self._base_world
-        self._world_from_face[:, 3, 2] = 1
+        self._distance = distance_of(image)
 
     @property
     def bounded(self) -> bool:
         """Whether it is known where on a ray its colour comes from."""
         return bool(np.isfinite(self.image.box).all())
+
+    def shift(self, clip_from_world: Matrix) -> Array | None:
+        """How far (object xyz) a matrix's eye is from the image's own; None where rays are parallel.
+
+        Raises
+        ------
+        ViewError
+            As `shown`.
+        """
+        rows = _checked(clip_from_world)[[0, 1, 3]]
+        size = np.prod(np.linalg.norm(rows[:, :3], axis=1))
+        if self.image.eye.is_at_infinity or abs(np.linalg.det(rows[:, :3])) <= _PARALLEL * size:
+            return None
+        return shift_of(self.image, -np.linalg.solve(rows[:, :3], rows[:, 3]))
 
     def shown(self, clip_from_world: Matrix) -> Shown | None:
         """What a window shows of the quads; None if nothing.
@@ -99,7 +108,8 @@ class Quads:
             No (4, 4) matrix of finite numbers.
         """
         clip = _checked(clip_from_world)
-        flat = clip[[0, 1, 3]] @ self._world_from_face  # (faces, 3, 3) to (x, y, w)
+        shift = self.shift(clip)
+        flat = clip[[0, 1, 3]] @ self._world_from_face(shift)  # (faces, 3, 3) to (x, y, w)
         scale = np.linalg.norm(flat, axis=1).prod(-1)
         edge_on = np.abs(np.linalg.det(flat)) <= 1e-12 * scale
         if not len(flat) or edge_on.all():
@@ -125,28 +135,21 @@ class Quads:
         start = depth[:, :3] @ self._base_world + depth[:, 3]
         return Shown(points, inverse, np.column_stack([linear, start]))
 
+    def _world_from_face(self, shift: Array | None) -> Array:
+        """(faces, 4, 3): face points (u, v, 1) to where the quads lie, all at one distance."""
+        distance = self._distance if shift is None else beyond_eye(self._distance, self.image.faces, shift)
+        points = self.start_from_face + distance * self.object_from_face
+        matrices = np.zeros((len(points), 4, 3))
+        matrices[:, :3] = self.image.world_from_object[:3, :3] @ points
+        matrices[:, :3, 2] += self._base_world
+        matrices[:, 3, 2] = 1
+        return matrices
+
     def _corners(self) -> Array:
         """(faces, 4, 3): corners of each face, half a pixel beyond the centres of its outermost pixels."""
         signs = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         sizes = np.array([face.size for face in self.image.faces])[:, None] / 2
         return np.concatenate([signs * sizes, np.ones((len(sizes), 4, 1))], -1)
-
-    def _distance(self) -> float:
-        """D of all quads, one number, so that those of several faces are sides of one box about the eye."""
-        faces, (low, high) = self.image.faces, self.image.box
-        if not faces or not self.bounded:
-            return 1.0
-        if faces[0].parallel is not None:
-            return faces[0].sign * float(low[faces[0].axis] + high[faces[0].axis]) / 2
-        ends = np.array([low, high]) - self.base
-        if len(faces) == 1:
-            depths = faces[0].sign * ends[:, faces[0].axis]
-            nearest, farthest = float(depths.min()), float(depths.max())
-        else:
-            nearest = float(np.abs(np.clip(0, *ends)).max())
-            farthest = float(np.abs(ends).max())
-        nearest = max(nearest, _NEAREST * farthest)
-        return 2 * nearest * farthest / (nearest + farthest) or 1.0
 
 
 def _middle(face: Face) -> tuple[float, float]:

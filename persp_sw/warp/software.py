@@ -11,16 +11,23 @@ from ..errors import ViewError
 from ..eye_image import EyeImage
 from ..geometry.faces import Face
 from ..geometry.parallel import Shear
-from ..geometry.view import View
+from ..geometry.view import Eye, View
 from ..kernels.warp import warp
 from ..volume.levels import STANDARD_AXES
 from .canvas import Canvas
+from .moved import distance_for, layers_for, shift_of
+
+# Components of unit vectors: two computations of one direction differ by rounding.
+_SAME_DIRECTION = 1e-9
 
 
 def warp_eye_image(
     eye_image: EyeImage, view: View, threads: int | None = None, out: Image | Canvas | None = None
 ) -> Image:
     """The picture of `view` from an eye image composited for walls that include the view's.
+
+    The view's eye may have moved since: then the image is where `moved` places it, and its slabs, if it has
+    any, are laid one over the other.
 
     Returns
     -------
@@ -30,10 +37,11 @@ def warp_eye_image(
     Raises
     ------
     ViewError
-        `out` has another size than the view.
+        `out` has another size than the view; or the rays of either eye are parallel and it is another one:
+        what is infinitely far away does not move, composite anew.
 
     Accuracy: the look-up is bilinear; which ray a pixel looks up is exact to float64 for the eye that the
-    image was composited for, whatever the pose.
+    image was composited for, whatever the pose. See `docs/rewarp.md` for one that has moved.
     """
     width, height = view.size
     canvas = Canvas(width, height) if out is None else out
@@ -45,51 +53,105 @@ def warp_eye_image(
             f"the view needs {height} rows of {width} pixels of 4 float32, contiguous; given "
             f"{pixels.dtype} {pixels.shape}"
         )
+    shift = _shift(eye_image, view.eye)
     if not eye_image.faces:
         pixels[:] = 0
         canvas.written[:] = 0
         return pixels
-    object_from_world = np.linalg.inv(eye_image.world_from_object)
-    faces = eye_image.faces
     _jit.set_threads(threads or _jit.max_threads())
-    warp(
-        np.array([_face_from_view(face, object_from_world, view) for face in faces]),
-        np.array([_borders(face, len(faces), object_from_world, view) for face in faces]),
-        np.array([(*face.size, eye_image.offset(number)) for number, face in enumerate(faces)]),
-        eye_image.pixels,
-        canvas.written,
-        pixels,
-    )
+    lowest, *others = layers_for(eye_image, shift)
+    _draw(lowest, view, shift, canvas)
+    for layer in others:
+        _draw(layer, view, shift, canvas.spare)
+        canvas.lay_over(canvas.spare)
     return pixels
 
 
-def _face_from_view(face: Face, object_from_world: Matrix, view: View) -> Matrix:
-    """(3, 3): pixel point (column, row, 1) of the view to (u, v, 1) of the face up to a positive factor.
+def _shift(image: EyeImage, eye: Eye) -> NDArray[np.float64]:
+    """How far (object xyz) the eye has moved since."""
+    if not (image.eye.is_at_infinity or eye.is_at_infinity):
+        return shift_of(image, eye.position)
+    if image.eye.w != eye.w or np.abs(image.eye.position - eye.position).max() > _SAME_DIRECTION:
+        raise ViewError(
+            "an eye image of parallel rays serves no other eye, nor one of an eye at a point parallel rays: "
+            f"it was made for {image.eye.position.tolist()} (w = {image.eye.w:g}), the view is of "
+            f"{eye.position.tolist()} (w = {eye.w:g}); composite anew"
+        )
+    return np.zeros(3)
 
-    Pixel centres of the face are whole numbers.
+
+def _draw(image: EyeImage, view: View, shift: NDArray[np.float64], canvas: Canvas) -> None:
+    """One image without its slabs."""
+    object_from_world = np.linalg.inv(image.world_from_object)
+    faces = image.faces
+    distance = distance_for(image, shift) if shift.any() else None
+    rays = [_tangents(face, object_from_world, view, shift, distance) for face in faces]
+    warp(
+        np.array([_pixel_from_tangents(face) @ matrix for face, matrix in zip(faces, rays, strict=True)]),
+        np.array([_borders(face, len(faces), object_from_world, view, shift, distance) for face in faces]),
+        np.array([(*face.size, image.offset(number)) for number, face in enumerate(faces)]),
+        image.pixels,
+        canvas.written,
+        canvas.pixels,
+    )
+
+
+def _pixel_from_tangents(face: Face) -> Matrix:
+    """(3, 3): (t_i, t_j, 1) to (u, v, 1) of the face, whose pixel centres are whole numbers."""
+    (t_i, t_j), pitch = face.origin, face.pitch
+    return np.array([[1 / pitch, 0, -t_i / pitch - 0.5], [0, 1 / pitch, -t_j / pitch - 0.5], [0, 0, 1]])
+
+
+def _tangents(
+    face: Face, object_from_world: Matrix, view: View, shift: NDArray[np.float64], distance: float | None
+) -> Matrix:
+    """(3, 3): pixel point (column, row, 1) of the view to tangents (t_i, t_j, 1), up to a positive factor.
+
+    With a distance D: those at which the image's eye sees what the view's, δ away, sees in the face's plane
+    there. Its ray e + δ + λ·d meets that at λ = (D − δ_k) / d_k, so t = (δ·d_k + (D − δ_k)·d) / (D·d_k),
+    where k counts along the face's sign.
     """
     if face.parallel is not None:
         shear = Shear(face.axis, face.sign, face.parallel)
-        tangents = shear.plane_from_pixel(object_from_world, view)
-    else:
-        direction = object_from_world[:3, :3] @ view.direction_from_pixel
-        tangents = direction[list(STANDARD_AXES[face.axis])]
-        tangents[2] *= face.sign
-    (t_i, t_j), pitch = face.origin, face.pitch
-    pixel_from_tangents = np.array(
-        [[1 / pitch, 0, -t_i / pitch - 0.5], [0, 1 / pitch, -t_j / pitch - 0.5], [0, 0, 1]]
-    )
-    return pixel_from_tangents @ tangents
+        return shear.plane_from_pixel(object_from_world, view)
+    axes = list(STANDARD_AXES[face.axis])
+    tangents = (object_from_world[:3, :3] @ view.direction_from_pixel)[axes]
+    tangents[2] *= face.sign
+    if distance is None:
+        return tangents
+    across, along = shift[axes[:2]], face.sign * shift[axes[2]]
+    tangents[:2] = np.outer(across, tangents[2]) + (distance - along) * tangents[:2]
+    tangents[2] *= distance
+    return tangents
 
 
-def _borders(face: Face, count: int, object_from_world: Matrix, view: View) -> NDArray[np.float64]:
+def _borders(
+    face: Face,
+    count: int,
+    object_from_world: Matrix,
+    view: View,
+    shift: NDArray[np.float64],
+    distance: float | None,
+) -> NDArray[np.float64]:
     """(m, 3): the face shows pixel points p with b·p ≥ 0; a single face shows all rays it holds.
 
-    Of several each shows the rays whose largest component is its own.
+    Of several each shows the rays whose largest component is its own; for a moved eye those that leave the
+    box of all faces through its side: d_k / (D − δ_k) is the largest of the six. Either side of a border has
+    the same numbers with opposite signs.
     """
     if count == 1:
         return np.empty((0, 3))
     direction = object_from_world[:3, :3] @ view.direction_from_pixel
     i, j, k = STANDARD_AXES[face.axis]
     along = face.sign * direction[k]
-    return np.array([along - direction[i], along + direction[i], along - direction[j], along + direction[j]])
+    if distance is None:
+        beside = direction[i], -direction[i], direction[j], -direction[j]
+        return np.array([along - other for other in beside])
+    reach = distance - face.sign * shift[k]
+    return np.array(
+        [
+            (distance - sign * shift[axis]) * along - reach * (sign * direction[axis])
+            for axis in (i, j)
+            for sign in (1, -1)
+        ]
+    )

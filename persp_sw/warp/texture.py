@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from . import shaders
 from .context import integers, opengl
 from .gl_objects import Program, Texture
 from .gl_state import drawing, uploading
+from .moved import layers_for
 from .quads import Quads, Shown
 
 _VIEWPORT = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], np.float32)
@@ -52,21 +54,24 @@ class TextureWarp:
         self._picture: Texture | None = None
 
     def upload(self, image: EyeImage, slot: str = "") -> None:
-        """Take an eye image into a slot, in place of what was in it; its texture is used again.
+        """Take an eye image into a slot, in place of what was in it; its textures are used again.
 
-        Cost: one upload, whatever the number of walls. Contexts that share may draw it at once.
+        Cost: one upload, whatever the number of walls, and one more for each of its slabs. Contexts that
+        share may draw it at once.
         """
         gl = _ready()
         old = self._slots.get(slot)
-        texture = old.texture if old else None
+        textures = list(old.textures) if old else []
+        images = (image, *image.slabs) if image.faces else ()
+        for spare in textures[len(images) :] if images else ():
+            spare.delete()
         with uploading():
-            if image.faces:
-                width, height = (max(face.size[axis] for face in image.faces) for axis in (0, 1))
-                size = (width, height, len(image.faces))
-                texture = Texture.fitting(texture, self.precision, size)
-                for number in range(len(image.faces)):
-                    texture.fill(image.face_pixels(number), number)
-        self._slots[slot] = _Slot(image, Quads(image), texture)
+            if images:
+                textures += [None] * (len(images) - len(textures))
+                textures = [self._filled(*each) for each in zip(textures, images, strict=False)]
+        self._slots[slot] = _Slot(
+            image, tuple(Quads(layer) for layer in (image, *image.slabs)), tuple(textures)
+        )
         gl.glFlush()
 
     def draw(self, clip_from_world: Matrix, slot: str = "", depth_test: bool = True) -> None:
@@ -76,7 +81,8 @@ class TextureWarp:
         ----------
         clip_from_world
             (4, 4), projection × view: world xyz1 to OpenGL's clip space. For the eye that the image was made
-            for the picture is exact; for an eye that has moved since it is what a plane in the volume shows.
+            for the picture is exact; for an eye that has moved since it is what a plane in the volume shows,
+            or the image's slabs, one plane each, from behind to the front.
         slot
             As given to `upload`; an image without faces draws nothing.
         depth_test
@@ -93,24 +99,25 @@ class TextureWarp:
         """
         if slot not in self._slots:
             raise ViewError(f"nothing was uploaded to the slot {slot!r}; there are {list(self._slots)}")
-        held = self._slots[slot]
-        shown = held.quads.shown(clip_from_world)
+        layers = self._slots[slot].layers(clip_from_world)
         gl = _ready()
-        if shown is None or held.texture is None:
+        if not layers:
             return
-        depth = depth_test and held.quads.bounded
-        faces = len(held.image.faces)
-        options = {f"FACES {faces}": faces > 1, "PARALLEL": held.image.eye.is_at_infinity}
+        image = layers[0].quads.image
+        depth = depth_test and layers[0].quads.bounded
+        faces = len(image.faces)
+        options = {f"FACES {faces}": faces > 1, "PARALLEL": image.eye.is_at_infinity}
         options |= {"DEPTH": depth, "EXACT": self.precision == "float32"}
         options |= {
-            "NEAR": depth and held.image.eye.near > 0,
-            "PLANES": depth and len(held.image.half_spaces) > 0,
+            "NEAR": depth and image.eye.near > 0,
+            "PLANES": depth and len(image.half_spaces) > 0,
         }
         with drawing():
             program = self._use(shaders.face_sources, options)
-            program.set(**_face_uniforms(held, shown, options))
-            held.texture.bind()
-            _draw(gl, program, shown.outline, depth)
+            for layer in layers:
+                program.set(**_face_uniforms(layer, options))
+                layer.texture.bind()
+                _draw(gl, program, layer.shown.outline, depth)
 
     def draw_view(
         self, view: View, slot: str = "", near: float | None = None, far: float | None = None
@@ -152,7 +159,8 @@ class TextureWarp:
     def close(self) -> None:
         """Delete all that was made; the context, or one that shares with it, must be current."""
         gl = opengl()
-        for texture in [*(held.texture for held in self._slots.values()), self._picture]:
+        held = [texture for slot in self._slots.values() for texture in slot.textures]
+        for texture in [*held, self._picture]:
             if texture is not None:
                 texture.delete()
         for program in self._programs.values():
@@ -164,6 +172,14 @@ class TextureWarp:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _filled(self, texture: Texture | None, image: EyeImage) -> Texture:
+        """The texture, or another where it does not fit, with the faces of an image."""
+        width, height = (max(face.size[axis] for face in image.faces) for axis in (0, 1))
+        texture = Texture.fitting(texture, self.precision, (width, height, len(image.faces)))
+        for number in range(len(image.faces)):
+            texture.fill(image.face_pixels(number), number)
+        return texture
 
     def _use(self, sources, options: dict[str, bool]) -> Program:
         chosen = frozenset(name for name, wanted in options.items() if wanted)
@@ -180,11 +196,34 @@ class TextureWarp:
         return program
 
 
+class _Layer(NamedTuple):
+    """An image to be drawn, and what a window shows of it."""
+
+    quads: Quads
+    texture: Texture
+    shown: Shown | None
+
+
 @dataclass(frozen=True, eq=False)
 class _Slot:
+    """An eye image; where its faces and those of its slabs, front to back, lie, and their textures.
+
+    An image without faces keeps the textures that were there for the next one.
+    """
+
     image: EyeImage
-    quads: Quads
-    texture: Texture | None
+    quads: tuple[Quads, ...]
+    textures: tuple[Texture, ...]
+
+    def layers(self, clip_from_world: Matrix) -> list[_Layer]:
+        """What to draw for a matrix's eye, the last on top; nothing where the window shows nothing."""
+        if not self.image.faces:
+            return []
+        shift = self.quads[0].shift(clip_from_world)
+        wanted = layers_for(self.image, np.zeros(3) if shift is None else shift)
+        held = [each for each in zip(self.quads, self.textures, strict=True) if each[0].image in wanted]
+        shown = [_Layer(quads, texture, quads.shown(clip_from_world)) for quads, texture in held[::-1]]
+        return [layer for layer in shown if layer.shown is not None]
 
 
 def _ready():
@@ -200,8 +239,9 @@ def _ready():
     return gl
 
 
-def _face_uniforms(held: _Slot, shown: Shown, options: dict[str, bool]) -> dict[str, NDArray | np.generic]:
-    image, quads = held.image, held.quads
+def _face_uniforms(layer: _Layer, options: dict[str, bool]) -> dict[str, NDArray | np.generic]:
+    quads, shown = layer.quads, layer.shown
+    image = quads.image
     uniforms = {
         "texels": np.int32(0),
         "face_from_ndc": shown.face_from_ndc,
