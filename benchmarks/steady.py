@@ -56,7 +56,7 @@ def room(options: argparse.Namespace) -> Rig:
     """The CAVE, with as many pixels a wall and as large a volume as wished for."""
     rig = load_rig(CAVE)
     walls = [replace(w, wall=replace(w.wall, pixels=(options.walls, options.walls))) for w in rig.walls]
-    return replace(rig, walls=walls, world=replace(rig.world, size=options.world))
+    return replace(rig, walls=walls, placement=replace(rig.placement, size=options.world))
 
 
 def run(rig: Rig, scene: str, recording: str | None, rate: float, options: argparse.Namespace) -> None:

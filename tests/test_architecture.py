@@ -48,7 +48,7 @@ VR_RANKS = {
     "rig": 1, "projection": 1,
     "eyes": 2, "placement": 2, "screen": 2,
     "cameras": 3, "rigs": 3, "trackers": 3, "moment": 3, "present": 3, "window": 3, "host_view": 3,
-    "pacing": 3, "worker": 3,
+    "pacing": 3,
     "frame": 4, "formats": 4, "room": 4, "rest_watch": 4,
     "host": 5, "steady": 5,
     "loop": 6,

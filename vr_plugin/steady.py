@@ -88,6 +88,9 @@ class Steady:
 
     def drawn(self, frame: Frame, upload_ms: float = 0.0, warp_ms: float = 0.0, swap_ms: float = 0.0) -> None:
         """What a frame took besides; the times that the same core cannot composite in."""
+        each = frame.statistics.values()
+        if any(s["encode_ms"] + s["compile_ms"] > 0 for s in each):
+            return  # the caches were cold, too: it tells nothing of the next one
         if frame.made is not None and frame.made.choice is not None:
             cost = replace(frame.made.cost, upload_ms=upload_ms, warp_ms=warp_ms, swap_ms=swap_ms)
             self._finished.append((cost, frame.made.choice))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from math import exp, log, sqrt
+from statistics import median
 
 import numpy as np
 
@@ -27,7 +29,8 @@ _RATIO_GAIN, _RATIO_JUMP = 0.7, 0.3
 _POWERS, _POWER_GAIN, _LEAST_MOVE = (-0.6, 0.5), 0.4, 0.04
 # A rung's own speed is learnt in its first frames.
 _RUNG_FRAMES = 4
-_PLANNING_GAIN = 0.1
+# Frames whose planning is judged by its median.
+_PLANNINGS = 9
 _TINY = 1e-9
 
 
@@ -45,7 +48,7 @@ class CostModel:
         self._state: np.ndarray | None = None  # ms; ms a face, a sample, a pixel
         self._covariance = np.eye(4)
         self._quiet = 0  # frames since the load changed
-        self._planning: float | None = None
+        self._plannings: deque[float] = deque(maxlen=_PLANNINGS)
         self._pixel_ratio = 0.0  # logs
         self._sample_ratios: dict[str, float] = {}
         self._places: dict[str, float] = {}  # log cost where the ratio was counted
@@ -73,7 +76,8 @@ class CostModel:
     def predict(self, features: SceneFeatures, rung: Rung, quality: float) -> float:
         """Milliseconds of compositing, planning included; the model must know a frame."""
         regressors = self._regressors(features, rung, quality)
-        return (self._planning or 0.0) + float(regressors @ self._state)
+        planning = median(self._plannings) if self._plannings else 0.0
+        return planning + float(regressors @ self._state)
 
     def new_scene(self) -> None:
         """What was learnt of samples and pixels counts no more; the machine's speed does."""
@@ -88,10 +92,7 @@ class CostModel:
         """A frame's cost; returns by how much (log) the load has jumped, 0 where it has not."""
         if features.shows_nothing or cost.ms <= 0:
             return 0.0
-        planned = self._planning
-        self._planning = (
-            cost.planning_ms if planned is None else planned + _PLANNING_GAIN * (cost.planning_ms - planned)
-        )
+        self._plannings.append(cost.planning_ms)
         moved = self._count(features, rung, quality, cost)
         # The planner rounds pixels: what jumps as quality changes is no change of load.
         moved = moved if (rung.name, quality) == self._at else 0.0
