@@ -53,11 +53,14 @@ class Made:
         The frame-time controller's; None where settings are fixed.
     cost
         Of compositing and planning.
+    begun_s
+        When that began, seconds of `time.monotonic`.
     """
 
     quality: float
     choice: psw.Choice | None
     cost: psw.FrameCost
+    begun_s: float
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,10 @@ _LATE = 0.1
 
 
 class Times(NamedTuple):
-    """When and how long, by the loop's clock: seconds; the stages in milliseconds."""
+    """When and how long, by the loop's clock: seconds; the stages in milliseconds.
+
+    On a display the clock is `time.monotonic`.
+    """
 
     begin_s: float
     end_s: float
@@ -65,6 +68,7 @@ def record_of(
         pixels=int(cost.pixels) if cost else None,
         faces=sum(len(image.faces) for image in frame.images.values()),
         compositings=frame.compositings if shown.is_new else 0,
+        image_age_ms=1e3 * (times.end_s - made.begun_s) if made and on_display else None,
         rewarped=shown.moment is not frame.moment,
         refined=refined,
     )

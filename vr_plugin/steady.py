@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from time import perf_counter
+from time import monotonic
 
 import persp_sw as psw
 
@@ -66,15 +66,14 @@ class Steady:
         Cancelled
             `cancel` was, meanwhile; the next frame goes on as if this one had not been asked for.
         """
-        renderer = self.maker.renderer
+        renderer, begun_s = self.maker.renderer, monotonic()
         if moment.regions is not None and moment.regions is not renderer.regions:
             renderer.regions = moment.regions
         if self.controller is None:
             quality = self.held or self.base.quality
             renderer.settings = replace(self.base, quality=quality)
             frame = self.maker.composite(moment, cancel)
-            return replace(frame, made=Made(quality, None, frame.cost()))
-        start = perf_counter()
+            return replace(frame, made=Made(quality, None, frame.cost(), begun_s))
         plans = self.maker.plan(moment)
         features = renderer.features_of_plans(plans.values())
         measured, of = self._finished.pop() if self._finished else (None, None)
@@ -82,9 +81,9 @@ class Steady:
         if self.refinement is not None:
             choice = self.refinement.next(choice, resting)
         renderer.settings = choice.apply(self.base)
-        planning_ms = 1e3 * (perf_counter() - start)
+        planning_ms = 1e3 * (monotonic() - begun_s)
         frame = self.maker.composite(moment, cancel, plans)
-        return replace(frame, made=Made(choice.quality, choice, frame.cost(planning_ms)))
+        return replace(frame, made=Made(choice.quality, choice, frame.cost(planning_ms), begun_s))
 
     def drawn(self, frame: Frame, upload_ms: float = 0.0, warp_ms: float = 0.0, swap_ms: float = 0.0) -> None:
         """What a frame took besides; the times that the same core cannot composite in."""
