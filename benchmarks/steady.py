@@ -19,12 +19,12 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from persp_sw.measure.trace_reading import read_trace
-from persp_sw.measure.trace_summary import summary
 
 import persp_sw as psw
 from persp_sw.measure.cases import data_folder, transfer_for, volume_named
 from persp_sw.measure.rules import Fixed, OpenCover
+from persp_sw.measure.trace_reading import read_trace
+from persp_sw.measure.trace_summary import summary
 from vr_plugin.cave.wall_pictures import SoftwareDrawer
 from vr_plugin.loop import Loop
 from vr_plugin.pacing import controller_for
