@@ -43,8 +43,8 @@ class EyeImage:
         which eyes that have moved since see it best. None: not measured; the middle of `box` serves.
     slabs
         The same in pieces, front to back, each between two distances and with its own `depth`: what moved
-        eyes are shown, with parallax. They differ from the image in `pixels` and `depth` only. Empty: the
-        image itself serves them.
+        eyes are shown, with parallax. They differ from the image in `pixels`, `box` and `depth` only. Empty:
+        the image itself serves them.
     """
 
     eye: Eye
@@ -108,6 +108,7 @@ class EyeImage:
             samples=np.int64(self.samples),
             box=self.box,
             half_spaces=self.half_spaces,
+            slab_boxes=np.array([slab.box for slab in self.slabs]).reshape(-1, 2, 3),
             depths=np.array([np.nan if i.depth is None else i.depth for i in (self, *self.slabs)]),
             slabs=np.array([slab.pixels for slab in self.slabs], np.float32).reshape(shape),
         )
@@ -126,7 +127,8 @@ class EyeImage:
             fits = all(shapes[name] == shape for name, shape in wanted.items())
             fits = fits and planes.ndim == 2 and planes.shape[1] == 4
             fits = fits and slabs.shape == (len(slabs), *pixels.shape) and slabs.dtype == np.float32
-            fits = fits and shapes["depths"] == (1 + len(slabs),)
+            boxes = content["slab_boxes"]
+            fits = fits and shapes["depths"] == (1 + len(slabs),) and boxes.shape == (len(slabs), 2, 3)
             if not (fits and pixels.ndim == 2 and pixels.shape[1] == 4 and pixels.dtype == np.float32):
                 raise ValueError(f"its arrays have the shapes {shapes}")
             faces = tuple(_face(*row) for row in content["faces"].tolist())
@@ -135,7 +137,7 @@ class EyeImage:
             eye = Eye(position, near, w)
             if any((face.parallel is not None) != eye.is_at_infinity for face in faces):
                 raise ValueError("its faces are another eye's")
-            if np.isnan(content["box"]).any() or not np.isfinite(planes).all():
+            if np.isnan(content["box"]).any() or np.isnan(boxes).any() or not np.isfinite(planes).all():
                 raise ValueError("its box or half-spaces are no numbers")
             depth, *depths = (None if np.isnan(d) else d for d in content["depths"].tolist())
             if not all(d is None or 0 < d < np.inf for d in (depth, *depths)):
@@ -143,8 +145,9 @@ class EyeImage:
             image = cls(
                 eye, content["world_from_object"], faces, pixels, samples, content["box"], planes, depth
             )
-            layers = (replace(image, pixels=p, depth=d) for p, d in zip(slabs, depths, strict=True))
-            image = replace(image, slabs=tuple(layers))
+            layers = zip(slabs, boxes, depths, strict=True)
+            layers = tuple(replace(image, pixels=p, box=b, depth=d) for p, b, d in layers)
+            image = replace(image, slabs=layers)
         except (OSError, EOFError, ValueError, TypeError, KeyError, OverflowError, BadZipFile) as error:
             raise ViewError(f"these {len(data)} bytes are not an eye image: {error}") from None
         if image.offset(len(faces)) != len(pixels):
@@ -152,7 +155,10 @@ class EyeImage:
         return image
 
 
-_CONTENT = "eye", "world_from_object", "faces", "pixels", "samples", "box", "half_spaces", "depths", "slabs"
+_CONTENT = (
+    *("eye", "world_from_object", "faces", "pixels", "samples", "box", "half_spaces"),
+    *("slabs", "slab_boxes", "depths"),
+)
 
 
 def _face(axis, sign, t_i, t_j, pitch, width, height, parallel_i, parallel_j) -> Face:

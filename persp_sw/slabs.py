@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from .arrays import Image
 from .eye_image import EyeImage
 from .geometry.faces import Face
-from .geometry.placement import depth_range
+from .geometry.placement import box_between, depth_range
 from .kernels.state import TILE
 from .seams import close_seams
 
@@ -49,6 +49,8 @@ class DepthProfile:
 
     Attributes
     ----------
+    eye
+        Object xyz.
     edges
         (n + 1,) inverse distances, 1 / voxels, falling: the steps, front to back. What lies before the first
         or behind the last is in the first or last step.
@@ -60,6 +62,7 @@ class DepthProfile:
         Voxel samples that looking took.
     """
 
+    eye: Array
     edges: Array
     opacity: Array
     contrast: Array
@@ -80,7 +83,7 @@ class DepthProfile:
             sums.append(sum(float(pixels[..., 3].sum(dtype=np.float64)) for pixels in images))
             slopes.append(_slopes(images))
         added = np.diff(slopes, axis=0)
-        return cls(edges, np.diff(sums), (added @ added.T).astype(np.float64), samples)
+        return cls(eye, edges, np.diff(sums), (added @ added.T).astype(np.float64), samples)
 
     def cuts(self, count: int) -> Array:
         """(count + 1,) falling inverse distances between which slabs lie: equal pieces, no empty ends."""
@@ -122,7 +125,8 @@ def in_slabs(image: EyeImage, count: int, residual: float, composite: Composite)
     margin = int(np.ceil(_UNCOVERED * farther / image.faces[0].pitch))
     samples, slabs, whole = profile.samples, [], image.pixels
     for (near, far), depth in zip(_ends(cuts), profile.depths(cuts), strict=True):
-        slab = replace(image, pixels=np.zeros_like(whole), depth=depth)
+        box = box_between(image.faces, profile.eye, image.box, near, far)
+        slab = replace(image, pixels=np.zeros_like(whole), box=box, depth=depth)
         images = [slab.face_pixels(number) for number in range(len(image.faces))]
         hidden = [_hidden(image.face_pixels(number), residual, margin) for number in range(len(images))]
         for pixels, where in zip(images, hidden, strict=True):

@@ -37,13 +37,16 @@ def test_bytes_round_trip_bit_for_bit(image):
 
 
 def test_depth_and_slabs_travel_too(image):
-    slabs = tuple(replace(image, pixels=image.pixels * factor, depth=4 + factor) for factor in (1, 2, 3))
+    slabs = tuple(
+        replace(image, pixels=image.pixels * factor, depth=4 + factor, box=image.box * factor)
+        for factor in (1, 2, 3)
+    )
     image = replace(image, depth=7.25, slabs=slabs)
     other = EyeImage.from_bytes(image.to_bytes())
     assert other.depth == 7.25 and [slab.depth for slab in other.slabs] == [5, 6, 7]
     for slab, given in zip(other.slabs, slabs, strict=True):
         np.testing.assert_array_equal(slab.pixels, given.pixels)
-        np.testing.assert_array_equal(slab.box, image.box)
+        np.testing.assert_array_equal(slab.box, given.box)
         assert slab.faces == image.faces and slab.slabs == ()
 
 
@@ -98,6 +101,7 @@ GOOD = {
     "half_spaces": np.zeros((0, 4)),
     "depths": np.array([NOWHERE, 3.0]),
     "slabs": np.zeros((1, 4, 4), np.float32),
+    "slab_boxes": np.array([[[0, 0, 0], [1, 1, 0.5]]]),
 }
 
 
@@ -125,6 +129,8 @@ GOOD = {
         {"depths": np.array([NOWHERE, 0.0])},
         {"depths": np.array([np.inf, 1.0])},
         {"slabs": np.zeros((1, 4, 4))},
+        {"slab_boxes": np.zeros((2, 2, 3))},
+        {"slab_boxes": np.full((1, 2, 3), np.nan)},
         {"slabs": np.zeros((1, 3, 4), np.float32)},
     ],
 )

@@ -94,6 +94,14 @@ TEXTURE_CONSTANT = 3e-7
 # one of some ten slices that make up a pixel, rms over phases (c uniform in 0 … ½) and noise about a quarter.
 CUT_SLICES = 0.01
 
+# The same pixels moved along by a fraction of a pixel: a blob 5 pixels wide and more is a sum of bilinear
+# look-ups of tents, whose centroid a lattice of pixels finds to 0.01 (as MARKER_PIXELS), twice.
+MARKER_MOVES = 0.02
+
+# A plane off the best by half a step of the look, a sixteenth of the range: near the best, planes an eighth
+# of it apart differ by 2 dB, so half a step makes 2 / 4; twice that, for shifts are not infinitely small.
+BEST_PLANE_DB = 1.0
+
 # --- Pictures ---------------------------------------------------------------------------------------------
 
 # Quality 1, a pixel a voxel, volumes of 64³ in 96² pixels. Smooth transfer functions: what users are

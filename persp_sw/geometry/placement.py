@@ -34,6 +34,16 @@ def depth_range(faces: Sequence[Face], eye: Array, box: Array) -> tuple[float, f
     return max(nearest, _NEAREST * farthest), farthest
 
 
+def box_between(faces: Sequence[Face], eye: Array, box: Array, nearest: float, farthest: float) -> Array:
+    """The part of a box (2, 3) between two distances; of several faces all that is before the second."""
+    low, high = -np.full(3, farthest), np.full(3, farthest)
+    if len(faces) == 1:
+        axis, sign = faces[0].axis, faces[0].sign
+        low, high = np.full(3, -np.inf), np.full(3, np.inf)
+        low[axis], high[axis] = (nearest, farthest) if sign > 0 else (-farthest, -nearest)
+    return np.array([np.maximum(box[0], eye + low), np.minimum(box[1], eye + high)])
+
+
 def middle_of(nearest: float, farthest: float) -> float:
     """The harmonic mean: a shifted head sees the same error at either end."""
     return 2 * nearest * farthest / (nearest + farthest) or 1.0
