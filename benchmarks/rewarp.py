@@ -2,17 +2,19 @@
 
     python benchmarks/rewarp.py [ct128 engine engine@128 FILE …] [--data FOLDER] [--size 256] [--no-truth]
 
-Each volume as fog and as surface, its longest edge 0.8 m and 1.2 m from the eye; and 2 m, the eye inside. The
-eye image is composited once, for a wall a quarter larger than the one shown, so that nothing is missing at its
-edges, and then drawn for eyes that have moved by 5, 10 and 20 mm: to the right, up and forwards.
+Each volume as fog and as surface, its longest edge 0.8 m and 1.2 m from the eye; and 2 m, the eye inside.
+The eye image is composited once, for a wall a quarter larger than the one shown, so that nothing is missing
+at its edges, and then drawn for eyes that have moved by 5, 10 and 20 mm: to the right, up and forwards.
 
-*fresh dB* is the PSNR against an eye image composited anew for the moved eye with the same settings: the error
-of the re-warp alone. *truth dB* is that against the float64 reference. Both are means over the three shifts.
+*fresh dB* is the PSNR against an eye image composited anew for the moved eye with the same settings: the
+error of the re-warp alone. *truth dB* is that against the float64 reference. Both are means over the three
+shifts.
 
 *mrad* is how far, as seen from the eye, a shift of 20 mm at right angles leaves things from where they should
-be: the root mean square, the median and the 95th percentile over all samples of all rays, weighted by what they
-add to the picture. It is computed from the samples' exact depths, by a march in float64 that shares no code
-with the renderer, and from the distances at which planes lie. Smaller shifts have less, nearly in proportion.
+be: the root mean square, the median and the 95th percentile over all samples of all rays, weighted by what
+they add to the picture. It is computed from the samples' exact depths, by a march in float64 that shares no
+code with the renderer, and from the distances at which planes lie. Smaller shifts have less, nearly in
+proportion.
 
 *composite*, *warp* are milliseconds relative to those of an image without depth, medians of interleaved runs;
 *samples* is counted. The warp is the software warp, on one canvas.
