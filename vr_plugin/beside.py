@@ -3,7 +3,7 @@ head is now."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,16 +41,18 @@ class Beside:
     Parameters
     ----------
     loop
-        Its tracker is polled by `show`, its renderer works in the thread: change its settings through
-        `loop.steady.base`, its regions through `loop.regions`.
+        Its eye images are made to be seen from elsewhere (`Settings.depth_slabs`, at least 1). Its tracker is
+        polled by `show`, its renderer works in the thread: change its settings through `loop.steady.base`,
+        its regions through `loop.regions`.
     period_s
         Of the display.
     """
 
     def __init__(self, loop: Loop, period_s: float):
         self.loop, self.period_s = loop, period_s
-        controller = loop.steady.controller
-        loop.steady.refinement = None if controller is None else psw.Refinement(controller.ladder)
+        steady, controller = loop.steady, loop.steady.controller
+        steady.base = replace(steady.base, depth_slabs=max(steady.base.depth_slabs, 1))
+        steady.refinement = None if controller is None else psw.Refinement(controller.ladder)
         self._rest = RestWatch()
         self._worker = Worker(self._work)
         self._making_s = period_s  # what a frame takes, smoothed

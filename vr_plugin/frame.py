@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import persp_sw as psw
 from persp_sw.errors import ViewError
 
+from .depths import KeptDepths
 from .eyes import EyePair
 from .moment import Moment, Sight
 from .pose import Pose
@@ -139,6 +141,7 @@ class FrameMaker:
         self.renderer = renderer
         self.walls = tuple(walls)
         self.room_from_world = room_from_world
+        self._depths = KeptDepths(renderer)
         self._previous: dict[str, psw.EyeImage] = {}
         self._said: set[str] = set()
 
@@ -210,9 +213,10 @@ class FrameMaker:
         for name, sight in moment.sights.items():
             if plans is None:
                 before = self._previous.get(name)
-                images[name] = self.renderer.composite(sight.eye, sight.walls, before, cancel)
+                make = partial(self.renderer.composite, sight.eye, sight.walls, before, cancel)
             else:
-                images[name] = self.renderer.composite_plan(plans[name], cancel)
+                make = partial(self.renderer.composite_plan, plans[name], cancel)
+            images[name] = self._depths.composite(name, sight.eye, make)
             statistics[name] = dict(self.renderer.last)
         self._previous.update(images)
         return Frame(moment, pictures_of(moment, images), images, statistics)
