@@ -102,6 +102,18 @@ def test_at_rest_it_refines_to_full_quality_and_then_does_nothing(loop):
         assert error.max() < 0.02  # the pitch may have stayed where it was
 
 
+def test_a_scene_that_changes_ends_the_rest(loop):
+    with Beside(loop, PERIOD) as beside:
+        display = Display(beside)
+        display.show(60)
+        before = display.show().frame
+        loop.regions = replace(loop.regions, crop=(0, 12, 0, 23, 0, 23))
+        after = display.show(3).frame
+        assert after is not before and after.moment.regions is loop.regions
+        samples = [sum(s["samples"] for s in f.statistics.values()) for f in (before, after)]
+        assert samples[1] < samples[0]
+
+
 def _walls(shown, eye):
     return [picture.view.wall for picture in shown.pictures if picture.eye == eye]
 

@@ -70,6 +70,6 @@ def test_where_nothing_is_seen_there_is_no_depth(scene):
     renderer, depths = scene
     away = psw.Wall((-40, -60, -40), (40, -60, -40), (-40, -60, 40), pixels=(64, 64))
     eye = psw.Eye((12.0, -30.0, 12.0))
-    for _ in range(3):
-        image = depths.composite("left", eye, lambda: renderer.composite(eye, [away]))
-        assert not image.faces and image.depth is None
+    for wall in (away, WALL, away):
+        image = depths.composite("left", eye, lambda wall=wall: renderer.composite(eye, [wall]))
+        assert (image.depth is not None) == bool(image.faces) == (wall is WALL)
