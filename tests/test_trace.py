@@ -133,6 +133,7 @@ def test_any_records_come_back(tmp_path: Path, seed: int):
     trace = read_trace(write(tmp_path / f"a.{SUFFIXES[seed % 2]}", records))
     assert not trace.cut
     assert len(trace) == len(records)
+    assert trace.name.endswith(".gz") == (tmp_path / trace.name).read_bytes().startswith(b"\x1f\x8b")
     read = list(trace.records())
     for record, back in zip(records, read, strict=True):
         for name, value in asdict(record).items():
@@ -202,6 +203,16 @@ def test_a_compressed_file_cut_anywhere_has_frames_before_that(tmp_path: Path, c
         counts.append(len(trace))
     assert counts == sorted(counts)
     assert 100 < counts[-1] <= 300
+
+
+def test_a_compressed_file_cut_between_two_lines_is_told(tmp_path: Path, caplog):
+    writer = psw.TraceWriter(tmp_path / "a.jsonl.gz")
+    data = (tmp_path / "a.jsonl.gz").read_bytes()  # the header is there before the first frame
+    writer.close()
+    (tmp_path / "cut.jsonl.gz").write_bytes(data)
+    trace = read_trace(tmp_path / "cut.jsonl.gz")
+    assert (trace.cut, len(trace)) == (True, 0)
+    assert len(caplog.records) == 1
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -303,7 +314,8 @@ GOOD = b'{"frame":0,"time_s":0.5}\n'
         (b'{"volume": "a.nrrd"}\n', "is no trace, line 1"),
         (b"[1, 2]\n", "is no trace, line 1"),
         (HEADER[:-10], "is no trace, line 1"),
-        (b"[" * 100_000 + b"\n", "is no trace, line 1"),
+        (b'{"a":' * 100_000 + b"\n", "is no trace, line 1"),
+        (HEADER + b'{"a":' * 100_000 + b"\n", "line 2: is no JSON object"),
         (b'{"format":"persp_sw trace","version":2}\n', "line 1: a trace of version 2"),
         (b'{"format":"persp_sw trace"}\n', "line 1: a trace of version None"),
         (HEADER + GOOD + b"1 2 3\n" + GOOD, "line 3: is no JSON object"),
@@ -326,6 +338,7 @@ GOOD = b'{"frame":0,"time_s":0.5}\n'
         ),
         (gzip.compress(HEADER + GOOD)[:-8] + bytes(8), "its compressed data are damaged"),
     ],
+    ids=lambda value: value[:30] if isinstance(value, str) else "data",
 )
 def test_foreign_and_damaged_files_are_refused(tmp_path: Path, data: bytes, message: str):
     path = tmp_path / "a.jsonl"
