@@ -128,8 +128,8 @@ def _legend(row: Sequence[Axes], beside_rates: bool) -> None:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
     last = row[-1]
-    inches = last.get_position().width * last.figure.get_figure(root=True).get_size_inches()[0]
-    row[-1].legend(
+    inches = last.get_window_extent().width / last.figure.dpi
+    last.legend(
         handles.values(),
         handles.keys(),
         loc="center left",
