@@ -202,6 +202,9 @@ class Renderer:
     def warp(self, eye_image: EyeImage, view: View, out: Image | Canvas | None = None) -> Image:
         """The picture of one view from an eye image; its wall must be one the eye image was made for.
 
+        The view's eye may have moved since; how well that looks, `Settings.depth_slabs` says. ViewError if it
+        or the image's is at infinity and it is another.
+
         `out`, a `Canvas` or (height, width, 4) float32, takes the picture if given. Pictures of a loop on one
         canvas cost least: only what the one before had drawn is cleared.
         """

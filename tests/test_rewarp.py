@@ -26,6 +26,7 @@ from persp_sw.kernels.warp import warp
 from persp_sw.seams import close_seams
 from persp_sw.slabs import _hidden
 from persp_sw.volume.levels import STANDARD_AXES
+from persp_sw.warp import software
 from persp_sw.warp.moved import distance_of
 from persp_sw.warp.software import warp_eye_image
 
@@ -119,8 +120,8 @@ def test_every_pixel_looks_where_its_ray_meets_the_images_plane(volume, rng, dis
     assert max(counts) == faces
 
 
-def looked_up(image, view):
-    """The picture of the image's own eye: every ray's direction is its tangents, no plane and no distance."""
+def own_rays(image, view):
+    """What the kernel needs for the image's own eye: rays' directions are tangents, at no distance."""
     directions = np.linalg.inv(image.world_from_object)[:3, :3] @ view.direction_from_pixel
     matrices, borders = [], []
     for face in image.faces:
@@ -129,23 +130,36 @@ def looked_up(image, view):
         (t_i, t_j), p = face.origin, face.pitch
         to_pixels = np.array([[1 / p, 0, -t_i / p - 0.5], [0, 1 / p, -t_j / p - 0.5], [0, 0, 1]])
         matrices.append(to_pixels @ np.array([i, j, along]))
-    borders = np.array(borders) if len(image.faces) > 1 else np.empty((1, 0, 3))
-    sizes = np.array([(*face.size, image.offset(number)) for number, face in enumerate(image.faces)])
-    canvas = Canvas(*view.size)
-    warp(np.array(matrices), borders, sizes, image.pixels, canvas.written, canvas.pixels)
-    return canvas.pixels
+    return np.array(matrices), np.array(borders) if len(image.faces) > 1 else np.empty((1, 0, 3))
 
 
-def test_an_eye_that_has_not_moved_sees_the_image_itself(volume):
-    """Bit for bit, wherever the image and its slabs lie."""
+def test_an_eye_that_has_not_moved_sees_the_image_itself(volume, monkeypatch):
+    """Bit for bit, wherever image and slabs lie: the kernel gets the numbers that know no distance."""
+    given = []
+    monkeypatch.setattr(software, "warp", lambda *arguments: given.append(arguments) or warp(*arguments))
     for distance, single in ((1.7, 3), (0.2, 1)):
         view = view_of(volume, DIRECTIONS[1], distance, fovy=80)
         image = composited(volume, view, single_face_tangent=single)
         truth = warp_eye_image(image, view)
-        np.testing.assert_array_equal(truth, looked_up(image, view))
         slabs = (replace(image, depth=3.0), replace(image, depth=9.0))
-        for other in (replace(image, depth=5.0), replace(image, depth=5.0, slabs=slabs)):
+        for other in (image, replace(image, depth=5.0), replace(image, depth=5.0, slabs=slabs)):
+            given.clear()
             np.testing.assert_array_equal(warp_eye_image(other, view), truth)
+            assert len(given) == 1
+            for found, expected in zip(given[0], own_rays(image, view), strict=False):
+                np.testing.assert_array_equal(found, expected)
+
+
+def test_slabs_of_a_solid_hold_its_colour_or_nothing(rng):
+    """What is hidden is left out: it is as empty as if there were nothing."""
+    volume = Volume(np.ones((60, 60, 60), np.uint8))
+    view = view_of(volume, DIRECTIONS[0], 2.0)
+    image = composited(volume, view, SOLID, depth_slabs=4, quality=2)
+    for slab in image.slabs:
+        np.testing.assert_allclose(slab.pixels, slab.pixels[:, 3:] * (1, 0.5, 0.2, 1), atol=1e-6)
+    first, *_, last = image.slabs
+    assert (first.pixels[:, 3] > 0.995).sum() > 2000
+    assert not last.pixels[(first.pixels[:, 3] > 0.995)].all() and last.pixels.any()
 
 
 def test_measuring_the_depth_changes_no_pixel(volume):

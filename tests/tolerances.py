@@ -98,8 +98,8 @@ CUT_SLICES = 0.01
 # look-ups of tents, whose centroid a lattice of pixels finds to 0.01 (as MARKER_PIXELS), twice.
 MARKER_MOVES = 0.02
 
-# A plane off the best by half a step of the look, a sixteenth of the range: near the best, planes an eighth
-# of it apart differ by 2 dB, so half a step makes 2 / 4; twice that, for shifts are not infinitely small.
+# A plane off the best by a quarter of a step of the look, an eighth of the range: near the best, planes an
+# eighth of it apart differ by 2 dB, a quarter of which is 0.5; twice that, as shifts are not very small.
 BEST_PLANE_DB = 1.0
 
 # --- Pictures ---------------------------------------------------------------------------------------------
