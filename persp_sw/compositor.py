@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,13 +62,14 @@ def composite_eye(
     )
     images = [image.face_pixels(number) for number in range(len(faces))]
     sampling = choose_sampling(settings, classification, volume)
+    level = cache(partial(_level, detail))  # zones, opposite faces and steps of depth have them in common
 
     def between(faces: Sequence[Face], images: Sequence[Image], nearest: float, farthest: float) -> int:
         limits = nearest, farthest
         return sum(
             _composite(
-                detail, classification, part, settings, sampling, eye, geometry.eye, face, threads, limits,
-                cancel, out,
+                detail, level, classification, part, settings, sampling, eye, geometry.eye, face, threads,
+                limits, cancel, out,
             )
             for face, out in zip(faces, images, strict=True)
             for part in plan.parts
@@ -84,6 +86,7 @@ def composite_eye(
 
 def _composite(
     detail: DetailStore,
+    level: Callable[[int, int, Part, bool], Level],
     classification: Classification,
     part: Part,
     settings: Settings,
@@ -139,7 +142,7 @@ def _composite(
         limits = [(0, 0, face.sign, -face.sign * k_0 - near)] * (near > 0)
         limits += [(0, 0, -face.sign, face.sign * k_0 + far)] * (far < np.inf)
         levels = [zone.fine, zone.fine + any(zone.share)]
-        fine, coarse = (_level(detail, number, face.axis, low, high, pairs) for number in levels)
+        fine, coarse = (level(number, face.axis, part, pairs) for number in levels)
         composite_face(
             Rays(
                 geometry,
@@ -177,15 +180,14 @@ def _level(
     detail: DetailStore,
     number: int,
     axis: int,
-    low: NDArray[np.float64],
-    high: NDArray[np.float64],
+    part: Part,
     pairs: bool,
 ) -> Level:
-    """Level `number` for the kernel; low, high: corners of the shown box, finest level, standard space."""
+    """What the kernel needs of a part in level `number`."""
     store, axes = detail.store(number), list(STANDARD_AXES[axis])
     runs = store.axis(axis, pairs=pairs)
     factor = detail.levels.factor(number)[axes].astype(np.float64)
-    box = np.column_stack([low / factor, high / factor])
+    box = np.column_stack([part.low[axes] / factor, part.high[axes] / factor])
     visible = store.visible_box()
     seen = box[1:] if visible is None else _overlap(box[1:], np.column_stack(visible)[axes[1:]])
     return Level(

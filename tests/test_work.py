@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from views import DIRECTIONS, view_of
 
-from persp_sw import Regions, Renderer, Settings, TransferFunction, Volume
+from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, Volume, compositor
 from persp_sw.kernels.scanline import Level, plane_range
+from persp_sw.measure.cave import four_walls, placed
+from persp_sw.volume.phantoms import synthetic_ct
 
 # Fog below 200; above it opaque within a voxel.
 ROWS = [(0, (0, 0, 1), 0), (150, (0, 1, 0), 0.05), (200, (1, 0, 0), 0.05), (201, (1, 0, 0), 0.9999)]
@@ -104,3 +106,14 @@ def test_the_planes_of_a_scanline_are_those_whose_interval_meets_what_is_seen(si
         assert wanted <= set(range(first, end))
         assert end - first <= len(wanted) + 2 if wanted else end - first <= 2 * per_interval
     assert met > 300 * per_interval
+
+
+def test_what_zones_and_faces_have_in_common_is_prepared_once(monkeypatch):
+    made = []
+    level = compositor._level
+    monkeypatch.setattr(compositor, "_level", lambda _, *which: made.append(which) or level(_, *which))
+    renderer = Renderer(placed(synthetic_ct(64)), FOG, Settings(quality=0.25))
+    image = renderer.composite(Eye((0.05, 1.5, -0.2)), four_walls(64))
+    assert len(image.faces) == 6
+    assert {number for number, *_ in made} == {0, 1}  # whose zones blend the two levels
+    assert len(made) == len(set(made))
