@@ -78,6 +78,32 @@ def test_a_display_shows_the_eyes_of_one_moment_from_where_the_head_is(loop):
                 assert picture.image is shown.frame.images[picture.eye]
 
 
+def test_a_head_mounted_display_has_a_margin_for_a_head_that_turns(loop):
+    """Turned by a degree since, a display full of fog shows fog up to its edges."""
+    fog = psw.Volume(np.full((16, 16, 16), 200, np.uint8))
+    transfer = psw.TransferFunction([(0, (1, 1, 1), 0.02), (255, (1, 1, 1), 0.02)], opacity_unit=1.0)
+    lens = psw.Wall((-1, -1, -1), (1, -1, -1), (-1, 1, -1), pixels=(64, 64), name="lens")
+    rig = replace(loop.rig, walls=[RigWall(lens, "left", fixed_to="head")])
+    hmd = Loop(rig, psw.Renderer(fog, transfer), Head())
+    hmd.tracker.at = (hmd.maker.room_from_world @ (*fog.centre, 1))[:3]
+    with Beside(hmd, PERIOD) as beside:
+        display = Display(beside)
+        display.show(3)
+        moment, turn = hmd.maker.moment, np.radians(1.0)
+
+        def turned(head, eyes, *rest, **more):
+            return moment(
+                replace(head, orientation=(0, np.sin(turn / 2), 0, np.cos(turn / 2))), eyes, *rest, **more
+            )
+
+        hmd.maker.moment = turned
+        shown = beside.show(display.now + PERIOD)
+        (picture,) = shown.pictures
+        assert shown.frame.moment.head.orientation[1] == 0.0
+        image = hmd.renderer.warp(picture.image, picture.view)
+        assert image[..., 3].min() > 0.5 * image[..., 3].max()
+
+
 def test_a_frame_is_new_once(loop):
     with Beside(loop, PERIOD) as beside:
         display = Display(beside)

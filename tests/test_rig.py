@@ -8,9 +8,10 @@ from rigs import rig_of, wall_keys
 from tolerances import MATRIX
 from views import random_pose, random_rotation
 
+import persp_sw as psw
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.pose import Pose, quaternion_of
-from vr_plugin.rig import TrackerPlace
+from vr_plugin.rig import RigWall, TrackerPlace
 from vr_plugin.rigs.similarity import flaw_of, parts_of, similarity
 
 
@@ -99,3 +100,16 @@ def test_measured_numbers_may_be_rounded(rng):
     matrix = np.eye(4)
     matrix[:3, :3] = 0.5 * random_rotation(rng)
     assert flaw_of(np.round(matrix, 3)) is None
+
+
+def test_a_head_s_wall_is_widened_all_around_and_a_room_s_is_not():
+    wall = psw.Wall((-1, -2, -3), (3, -2, -3), (-1, 4, -3), pixels=(400, 300), name="lens")
+    head = RigWall(wall, fixed_to="head")
+    wide = head.widened(0.1).wall
+    np.testing.assert_allclose(wide.lower_left, (-1.4, -2.6, -3))
+    np.testing.assert_allclose(wide.lower_right, (3.4, -2.6, -3))
+    np.testing.assert_allclose(wide.upper_left, (-1.4, 4.6, -3))
+    assert wide.pixels == (480, 360) and wide.name == "lens"
+    assert head.widened(0.0) is head
+    room = RigWall(wall)
+    assert room.widened(0.1) is room

@@ -16,6 +16,9 @@ from .rest_watch import RestWatch
 from .shown import Shown
 from .worker import Worker
 
+# Of a head's walls: at the edge of a display of 90° that is 1.7°, as much as a head that turns by 100° a
+# second goes in a period of 60 Hz. Prediction leaves less.
+_MARGIN = 0.03
 # Part of the way from the old mean to a new time of compositing.
 _FOLLOW = 0.3
 
@@ -78,7 +81,7 @@ class Beside:
             cost = frame.made.cost
             self._making_s += _FOLLOW * (1e-3 * (cost.ms + cost.planning_ms) - self._making_s)
             self._shown, self._gave_up = frame, False
-        self._ask(moment, now)
+        self._ask(now)
         return None if frame is None else Shown(frame, moment, is_new)
 
     def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
@@ -98,14 +101,15 @@ class Beside:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _ask(self, moment: Moment, now: float) -> None:
+    def _ask(self, now: float) -> None:
+        moment = self.loop.moment(now + self.period_s + self._making_s, _MARGIN)
         wanted = self.loop.steady.base, self.loop.steady.held
         if self._rest.look(moment, now):
             order = Order(self._rest.anchor, wanted, resting=True)
             if self._is_asked(order) and (self._worker.is_busy or self._is_full):
                 return
         else:
-            order = Order(self.loop.moment(now + self.period_s + self._making_s), wanted)
+            order = Order(moment, wanted)
         self._worker.ask(order, cancel_running=self._is_useless(order))
         self._asked = order
 

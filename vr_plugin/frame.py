@@ -161,7 +161,13 @@ class FrameMaker:
         return self.composite(self.moment(head, eyes, near, modes))
 
     def moment(
-        self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE, **more: Any
+        self,
+        head: Pose,
+        eyes: EyePair,
+        near: float = 0.0,
+        modes: Mapping[str, str] = _NONE,
+        margin: float = 0.0,
+        **more: Any,
     ) -> Moment:
         """What each eye sees on which wall; no pixel yet.
 
@@ -171,11 +177,13 @@ class FrameMaker:
             Metres before each eye in which nothing is shown.
         modes
             Stereo modes by wall name, where not the rig's own.
+        margin
+            By which a head's walls are widened: `RigWall.widened`.
         more
             What else the moment knows: its regions, its stamp.
         """
         shown = {wall.name: eyes_of(modes.get(wall.name, wall.stereo)) for wall in self.walls}
-        walls = [(wall, self._in_world(wall.in_room(head))) for wall in self.walls]
+        walls = [(wall, self._in_world(wall.widened(margin).in_room(head))) for wall in self.walls]
         sights, edge_on = {}, []
         for name in dict.fromkeys(name for names in shown.values() for name in names):
             eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)

@@ -96,12 +96,21 @@ class Loop:
             clip = (*self._regions.clip, *self.wand.clip_planes)
             self.regions = replace(self._regions, clip=clip)
 
-    def moment(self, shown_at: float) -> Moment:
-        """What the eyes see at a time that may lie ahead: the head goes on as it moves."""
+    def moment(self, shown_at: float, margin: float = 0.0) -> Moment:
+        """What the eyes see at a time that may lie ahead: the head goes on as it moves.
+
+        `margin`: of a head's walls, see `RigWall.widened`.
+        """
         head = self.head.pose_at(shown_at)
         eyes = eyes_of_head(head, self.rig.eyes)
         return self.maker.moment(
-            head, eyes, self.rig.eyes.near, self.modes, regions=self.regions, stamp=self.head.stamp
+            head,
+            eyes,
+            self.rig.eyes.near,
+            self.modes,
+            margin,
+            regions=self.regions,
+            stamp=self.head.stamp,
         )
 
     def look(self, moment: Moment) -> None:

@@ -76,6 +76,19 @@ class RigWall:
         corners = (room_from_head.apply(c) for c in (w.lower_left, w.lower_right, w.upper_left))
         return psw.Wall(*corners, pixels=w.pixels, name=w.name)
 
+    def widened(self, share: float) -> RigWall:
+        """A head's wall with a margin all around, `share` of its width and height; a room's wall as it is.
+
+        What eye images are composited for that will be shown to a head that has turned since.
+        """
+        if self.fixed_to == "room" or share == 0:
+            return self
+        w = self.wall
+        across, up = share * (w.lower_right - w.lower_left), share * (w.upper_left - w.lower_left)
+        corners = w.lower_left - across - up, w.lower_right + across - up, w.upper_left - across + up
+        pixels = tuple(round((1 + 2 * share) * n) for n in w.pixels)
+        return replace(self, wall=psw.Wall(*corners, pixels=pixels, name=w.name))
+
 
 @dataclass(frozen=True, eq=False)
 class Eyes:
