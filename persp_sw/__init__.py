@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .quality.features import FrameCost, SceneFeatures
     from .quality.ladder import Ladder
     from .quality.rest import Refinement
+    from .quality.saved_ladder import ladder_for
     from .renderer import Renderer
     from .scene import Scene
     from .settings import Settings
@@ -64,6 +65,7 @@ __all__ = [
     "Wall",
     "__version__",
     "images",
+    "ladder_for",
     "load",
     "read_trace",
     "reference",
@@ -98,6 +100,7 @@ _HOME = {
     "View": ".geometry.view",
     "Volume": ".volume.grid",
     "Wall": ".geometry.view",
+    "ladder_for": ".quality.saved_ladder",
     "load": ".volume.files",
     "read_trace": ".measure.trace_reading",
 }

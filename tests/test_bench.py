@@ -13,9 +13,11 @@ from samples import ROOT, fails, result_of, run
 
 import persp_sw as psw
 from persp_sw import reference
-from persp_sw.errors import MissingPackageError, ViewError
+from persp_sw.errors import GraphicsError, MissingPackageError, ViewError
 from persp_sw.measure import bench, peers
+from persp_sw.measure.chart import Chart, ladder_of
 from persp_sw.measure.metrics import compare
+from persp_sw.measure.textures import texture_rows
 
 BRIEF = ("--seconds", 0.01, "--threads", 1)
 
@@ -219,35 +221,118 @@ def test_both_mappers_make_a_group():
 # --- chart -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg"])
-def test_the_chart_shows_all_points(scene_file: Path, tmp_path: Path, monkeypatch, suffix: str):
+CHART = ("--threads", 1, "--seconds", 0.01)
+
+
+@pytest.fixture
+def ladders(tmp_path: Path, monkeypatch) -> Path:
+    """The folder of ladders, not the user's."""
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    return tmp_path / "data" / "persp_sw" / "ladders"
+
+
+@pytest.mark.parametrize("name", ["chart", "chart.png", "new/chart.svg", "chart.pdf"])
+def test_the_chart_shows_all_points(scene_file: Path, tmp_path: Path, ladders: Path, monkeypatch, name: str):
     pytest.importorskip("matplotlib")
     monkeypatch.setattr(peers, "peers_named", lambda names, threads: [Copycat(n) for n in threads])
-    out = tmp_path / f"chart.{suffix}"
-    choice = ("--quality", 1, "--quality", 2, "--threads", 1, "--seconds", 0.01, "--peer", "vtk")
+    out = tmp_path / name
+    choice = ("--quality", 2, "--quality", 1, *CHART, "--peer", "vtk")
     values = result_of("chart", scene_file, *choice, "-o", out)
     ours = [row for row in values["rows"] if "mode" in row]
-    assert {row["mode"] for row in ours} >= {"1 sample", "2 samples", "4 samples"}
+    assert {row["mode"] for row in ours} >= {"1 sample", "2 samples", "4 samples", "pre-integrated"}
     assert {row["quality"] for row in ours} == {1, 2}
-    assert any(row["on_front"] for row in ours)
+    assert all(row["ms"] > 0 and 0 < row["ssim"] <= 1 and row["psnr"] > 20 for row in ours)
+    best = [row for row in ours if row["on_front"]]
+    for row in ours:
+        beaten = [b for b in best if b["ms"] <= row["ms"] and b["psnr"] >= row["psnr"]]
+        assert beaten == [row] if row["on_front"] else beaten
     (equal,) = values["equal_accuracy"]
     assert equal["ratio"] > 1
-    if suffix == "png":
-        with Image.open(out) as picture:
-            assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 50
-    else:
-        text = out.read_text()
-        for words in ("scene", "copycat", "4 samples", "PSNR", "ms a frame, 1 thread"):
-            assert words in text
+    with Image.open(out.with_suffix(".png")) as picture:
+        assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 50
+    text = out.with_suffix(".svg").read_text()
+    for words in ("scene", "copycat", "4 samples", "front", "PSNR, dB", "SSIM", "ms a frame, 1 thread"):
+        assert words in text
+    assert json.loads(out.with_suffix(".json").read_text()) == values
+    assert out.with_suffix(".pdf").exists() == (name == "chart.pdf")
+    suffixes = (".png", ".svg", *([".pdf"] if name == "chart.pdf" else []), ".json")
+    assert values["files"] == [str(out.with_suffix(suffix)) for suffix in suffixes]
+    # From quality 1 on it would be a ladder without its lower end.
+    assert not ladders.exists()
+    assert "0.5 to 2" in values["ladders"][0]["why_not"]
 
 
-def test_the_charts_table(scene_file: Path, tmp_path: Path):
+def test_the_chart_keeps_the_ladder_that_a_session_finds(scene_file: Path, tmp_path: Path, ladders: Path):
     pytest.importorskip("matplotlib")
-    choice = ("--quality", 1, "--threads", 1, "--seconds", 0.01)
-    result = run("chart", scene_file, *choice, "-o", tmp_path / "a.png")
+    qualities = ("--quality", 0.25, "--quality", 0.5, "--quality", 1, "--quality", 2)
+    values = result_of("chart", scene_file, *qualities, *CHART, "-o", tmp_path / "chart")
+    (kept,) = values["ladders"]
+    scene = psw.Scene.load(scene_file)
+    renderer = psw.Renderer(scene.volume, scene.transfer, psw.Settings(threads=1))
+    found = psw.ladder_for(renderer)
+    assert list(ladders.iterdir()) == [Path(kept["file"])]
+    assert [rung.name for rung in found.rungs] == [rung["name"] for rung in kept["rungs"]]
+    ours = {(row["mode"], row["quality"]): row for row in values["rows"] if "mode" in row}
+    for rung in found.rungs:
+        assert rung.changes == next(row["changes"] for (mode, _), row in ours.items() if mode == rung.name)
+        for point in rung.points[1:-1]:  # ends may lie between measured points
+            row = ours[rung.name, point.quality]
+            assert (point.cost, point.psnr) == pytest.approx((row["composite_ms"], row["psnr"]))
+    controller = psw.FrameTimeController(20.0, found)
+    view = scene.views()[0]
+    choice = controller.next(renderer.features([view.eye], [view.wall]))
+    settings = choice.apply(psw.Settings(threads=1, samples_per_interval=4))
+    assert settings.samples_per_interval == dict(found.rungs[0].changes)["samples_per_interval"]
+    assert settings.threads == 1
+
+
+def test_the_charts_table(scene_file: Path, tmp_path: Path, ladders: Path):
+    pytest.importorskip("matplotlib")
+    result = run("chart", scene_file, "--quality", 0.5, "--quality", 2, *CHART, "-o", tmp_path / "a.png")
     assert result.exit_code == 0, result.output
-    assert "q 1, 2 samples" in result.stdout
-    assert "a.png" in result.stdout
+    assert "q 0.5, 2 samples" in result.stdout
+    for words in ("a.png", "a.svg", "a.json", "the ladder for steady frames", str(ladders)):
+        assert words in result.stdout.replace("\n", "")
+    alone = run("chart", scene_file, "--quality", 1, *CHART, "-o", tmp_path / "a.png")
+    assert "no ladder was kept" in alone.stdout
+
+
+def test_two_views_make_one_ladder():
+    def row(mode, quality, ms, psnr):
+        return {
+            "mode": mode,
+            "quality": quality,
+            "composite_ms": ms,
+            "psnr": psnr,
+            "changes": {"residual": 0.01},
+        }
+
+    one = [row("a", 0.5, 1.0, 30.0), row("a", 2.0, 4.0, 40.0), row("b", 1.0, 2.0, 60.0)]
+    two = [row("a", 0.5, 4.0, 20.0), row("a", 2.0, 9.0, 50.0), {"renderer": "peer"}]
+    ladder = ladder_of([Chart(rows, [], "v") for rows in (one, two)], psw.Settings(threads=1))
+    (rung,) = ladder.rungs
+    assert (ladder.volume, rung.name, rung.changes) == ("v", "a", {"residual": 0.01})
+    found = [value for point in rung.points for value in (point.quality, point.cost, point.psnr)]
+    assert found == pytest.approx([0.5, 2.0, 25.0, 2.0, 6.0, 45.0])
+
+
+@pytest.mark.gl
+def test_texture_formats_have_their_times_and_errors(gl_context, scene_file: Path):
+    scene = psw.Scene.load(scene_file)
+    renderer = psw.Renderer(scene.volume, scene.transfer)
+    rows = texture_rows(renderer, scene.views()[0])
+    assert [row["texture"] for row in rows] == ["float32", "float16", "rgba8"]
+    assert rows[0]["max_error"] < rows[1]["max_error"] < rows[2]["max_error"]
+    assert all(row["upload_ms"] > 0 and row["draw_ms"] > 0 for row in rows)
+
+
+def test_without_opengl_there_are_no_texture_formats(scene_file: Path, monkeypatch):
+    def refuse(*_):
+        raise GraphicsError("no OpenGL here")
+
+    monkeypatch.setattr("persp_sw.measure.textures.OffscreenContext", refuse)
+    scene = psw.Scene.load(scene_file)
+    assert texture_rows(psw.Renderer(scene.volume, scene.transfer), scene.views()[0]) == []
 
 
 def test_a_chart_of_what_cannot_be_rendered_is_a_mistake(scene_file: Path, tmp_path: Path, monkeypatch):
@@ -257,6 +342,8 @@ def test_a_chart_of_what_cannot_be_rendered_is_a_mistake(scene_file: Path, tmp_p
     monkeypatch.setattr(psw.Renderer, "composite", refuse)
     assert "not from here" in fails("chart", scene_file, "-o", tmp_path / "a.png")
     assert ".png, .svg" in fails("chart", scene_file, "-o", tmp_path / "a.jpg")
+    (tmp_path / "b.svg").mkdir()
+    assert "b.svg" in fails("chart", scene_file, "-o", tmp_path / "b")
 
 
 # --- warmup ------------------------------------------------------------------------------------------------

@@ -236,17 +236,6 @@ def test_switches_change_one_thing_and_unknown_ones_are_left_out():
 # --- fronts ------------------------------------------------------------------------------------------------
 
 
-def test_the_front_is_what_nothing_beats(rng):
-    ms, accuracy = rng.integers(1, 20, (2, 60)).astype(float)
-    unbeaten = {
-        (m, a)
-        for m, a in zip(ms, accuracy, strict=True)
-        if not any((m2 <= m and a2 >= a) and (m2 < m or a2 > a) for m2, a2 in zip(ms, accuracy, strict=True))
-    }
-    kept = chart.front(ms, accuracy)
-    assert [(ms[n], accuracy[n]) for n in kept] == sorted(unbeaten)
-
-
 def point(mode: str, ms: float, accuracy: float) -> dict:
     return {"renderer": "persp_sw", "case": "c", "threads": 2, "mode": mode, "ms": ms, "psnr": accuracy}
 

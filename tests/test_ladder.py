@@ -10,7 +10,7 @@ import persp_sw as psw
 from persp_sw.errors import SettingsError
 from persp_sw.measure.replay import Disturbance, replay
 from persp_sw.quality.controller import FrameTimeController
-from persp_sw.quality.ladder import Ladder, Point, Rung, ladder_from_points
+from persp_sw.quality.ladder import Ladder, Point, Rung
 
 ONE = Rung("one", {"samples_per_interval": 1}, (Point(0.5, 1.0), Point(1.0, 4.0), Point(2.0, 8.0)))
 TWO = Rung("two", {"samples_per_interval": 2}, (Point(0.5, 5.0), Point(2.0, 20.0)))
@@ -50,6 +50,14 @@ def test_limits_cut_rungs_and_drop_those_outside():
         Ladder((ONE,)).limited(3.0, 4.0)
 
 
+def test_limits_drop_what_then_goes_beyond_no_other():
+    """Two ways of equal quality, the second cheaper: cut alike, it would begin and end below the first."""
+    slow = Rung("slow", {}, (Point(0.25, 1.0), Point(1.0, 8.0)))
+    fast = Rung("fast", {"residual": 0.02}, (Point(0.9, 6.0), Point(2.0, 20.0)))
+    assert Ladder((slow, fast)).limited(0.95, 1.0).rungs[0].name == "slow"
+    assert len(Ladder((slow, fast)).limited(0.5, 2.0).rungs) == 2
+
+
 @pytest.mark.parametrize(
     ("rungs", "said"),
     [
@@ -70,9 +78,10 @@ def test_what_is_no_ladder_is_refused(rungs, said):
 
 
 def test_a_saved_ladder_comes_back_for_its_machine_and_volume_alone(tmp_path):
-    ladder = Ladder((ONE, TWO), "Some CPU, 2 cores", "head / CT.nrrd 256x256x128")
+    ladder = Ladder((ONE, TWO), "Some CPU, 2 cores", "head / CT.nrrd 256x256x128", "of today")
     path = ladder.save(tmp_path / "new folder")
     assert Ladder.load(path.parent, ladder.machine, ladder.volume) == ladder
+    assert list(path.parent.iterdir()) == [path]
     assert Ladder.load(path.parent, ladder.machine, "other") == Ladder.default()
     assert Ladder.load(tmp_path / "absent", ladder.machine, ladder.volume) == Ladder.default()
 
@@ -89,7 +98,7 @@ def test_names_that_differ_in_punctuation_alone_have_files_of_their_own(tmp_path
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[]", "{}", '{"format": 1, "rungs": 3}', '{"format": 1, "rungs": [{}]}']
+    "text", ["", "[]", "{}", '{"format": 2, "rungs": 3}', '{"format": 2, "rungs": [{}]}']
 )
 def test_a_file_that_is_no_ladder_is_named(tmp_path, text):
     path = Ladder((ONE,), "m", "v").save(tmp_path)
@@ -102,14 +111,6 @@ def test_a_ladder_of_another_version_is_not_used(tmp_path):
     path = Ladder((ONE,), "m", "v").save(tmp_path)
     path.write_text(json.dumps({**json.loads(path.read_text()), "format": 99}))
     assert Ladder.load(tmp_path, "m", "v") == Ladder.default()
-
-
-def test_a_front_becomes_a_ladder():
-    points = [(rung.name, rung.changes, point) for rung in (TWO, ONE) for point in rung.points]
-    assert ladder_from_points(points).rungs == (ONE, TWO)
-    alone = ("three", {"samples_per_interval": 4}, Point(0.3, 0.1))  # nothing to walk
-    far = [("four", {"samples_per_interval": 4}, Point(q, 50 * q)) for q in (1.0, 2.0)]  # a gap before it
-    assert ladder_from_points([*points, alone, *far]).rungs == (ONE, TWO)
 
 
 def two_rungs():

@@ -37,7 +37,18 @@ def print_chart(values: Row) -> None:
             values["equal_accuracy"],
             heading="case",
         )
-    click.echo(f"the chart is {values['out']}")
+    if values["textures"]:
+        print_table(
+            "texture formats, beside the software warp", _TEXTURES, values["textures"], heading="case"
+        )
+    for ladder in values["ladders"]:
+        if ladder["file"] is None:
+            click.echo(f"{ladder['case']}: no ladder was kept: {ladder['why_not']}")
+            continue
+        rungs = [{"case": ladder["case"], **rung} for rung in ladder["rungs"]]
+        print_table("the ladder for steady frames", _LADDER, rungs, heading="case")
+        click.echo(f"kept in {ladder['file']}")
+    click.echo(f"the chart is {', '.join(values['files'])}")
 
 
 def _who(row: Row) -> str:
@@ -103,6 +114,7 @@ _CHART: Columns = [
     ("PSNR", number("psnr", ".1f")),
     ("covered", number("psnr_covered", ".1f")),
     ("mean error", number("mean_signed_error", "+.1e")),
+    ("SSIM", number("ssim", ".4f")),
     ("front", lambda row: row["front"]),
 ]
 _CHART_EQUAL: Columns = [
@@ -113,3 +125,21 @@ _CHART_EQUAL: Columns = [
     ("ours ms", milliseconds("equal_ms")),
     ("ratio", lambda row: ratio("ratio")(row) or "not reached"),
 ]
+_TEXTURES: Columns = [
+    ("texture", lambda row: row["texture"]),
+    ("upload", milliseconds("upload_ms")),
+    ("draw", milliseconds("draw_ms")),
+    ("PSNR", number("psnr", ".1f")),
+    ("largest error", number("max_error", ".1e")),
+    ("OpenGL by", lambda row: row["gl"]),
+]
+_LADDER: Columns = [
+    ("rung", lambda row: row["name"]),
+    ("quality", lambda row: _span(row, "quality")),
+    ("composite ms", lambda row: _span(row, "cost")),
+    ("PSNR", lambda row: _span(row, "psnr")),
+]
+
+
+def _span(row: Row, name: str) -> str:
+    return " … ".join(f"{row['points'][end][name]:.3g}" for end in (0, -1))

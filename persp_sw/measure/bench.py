@@ -55,6 +55,8 @@ class Plan:
         Timed for each contestant.
     search
         Whether to look for our settings that equal each peer's accuracy.
+    waste
+        Whether to count the samples that could not be done without, which takes longer than a frame.
     """
 
     settings: Sequence[Settings]
@@ -62,6 +64,7 @@ class Plan:
     seconds: float = 1.0
     peers: Sequence[Peer] = ()
     search: bool = True
+    waste: bool = True
     progress: Progress = field(default=lambda done, total, what: None)
 
 
@@ -84,22 +87,31 @@ def measure(case: Case, plan: Plan) -> list[Row]:
         return [{**case.labels, "renderer": "persp_sw", "error": str(error)}]
     ours = [first, *(Ours(renderer, settings) for settings in plan.settings[1:])]
     contestants: list[tuple[Row, Any]] = [({**case.labels, **settings_row(o.settings)}, o) for o in ours]
-    failed = []
-    for peer in plan.peers:
-        row = {**case.labels, "renderer": peer.name, "threads": peer.threads}
-        try:
-            peer.open(stage)
-            row |= compare(peer.picture(view), truth)
-        except PerspSWError as error:
-            failed.append({**row, "error": str(error)})
-            continue
-        contestants.append((row, peer))
+    able, failed = open_peers(case, stage, plan.peers, truth)
+    contestants += able
     if plan.search:
         contestants += _equals(case, plan, contestants, renderer, view, truth)
     try:
         return time_rows(contestants, stage, truth, plan) + failed
     except PerspSWError as error:  # on the way: an eye that walks into the volume, a peer that dies
         return [{**case.labels, "renderer": "persp_sw", "error": str(error)}, *failed]
+
+
+def open_peers(
+    case: Case, stage: Stage, peers: Sequence[Peer], truth: np.ndarray
+) -> tuple[list[tuple[Row, Peer]], list[Row]]:
+    """Peers with the scene as contestants, their rows begun; rows with `error` of those that fail."""
+    able, failed = [], []
+    for peer in peers:
+        row = {**case.labels, "renderer": peer.name, "threads": peer.threads}
+        try:
+            peer.open(stage)
+            row |= compare(peer.picture(stage.views[-1]), truth)
+        except PerspSWError as error:
+            failed.append({**row, "error": str(error)})
+        else:
+            able.append((row, peer))
+    return able, failed
 
 
 def settings_row(settings: Settings) -> Row:
@@ -122,7 +134,7 @@ def time_rows(
             contestant.prepare(view)  # encodes and compiles apart
             row |= compare(contestant.picture(view), truth)
         if isinstance(contestant, Ours):
-            row |= contestant.counts(stage, view)
+            row |= contestant.counts(stage, view, plan.waste)
     turns = iter(range(1, 1 + 5 * len(contestants)))
     times = time_in_turn(
         [contestant for _, contestant in contestants],

@@ -13,7 +13,7 @@ from ..settings import Settings
 
 Changes = Mapping[str, Any]
 
-# Each a curve in the chart, along the qualities.
+# Where settings as accurate as a peer are looked for.
 MODES: dict[str, Changes] = {
     "1 sample": {"samples_per_interval": 1},
     "2 samples": {"samples_per_interval": 2},
@@ -21,6 +21,21 @@ MODES: dict[str, Changes] = {
     "pre-integrated": {"preintegrated": True, "samples_per_interval": 1},
     "pre-integrated, 2 samples": {"preintegrated": True, "samples_per_interval": 2},
     "4 samples, residual 0.0005": {"samples_per_interval": 4, "residual": 0.0005},
+}
+
+# Each a curve in the chart, along the qualities. All that a chart varies is set, not left as the user has it.
+_AS_USUAL: Changes = {
+    "preintegrated": False,
+    **{name: getattr(Settings(), name) for name in ("residual", "single_face_tangent", "level_of_detail")},
+}
+SAMPLING: dict[str, Changes] = {
+    name: {**_AS_USUAL, **changes} for name, changes in MODES.items() if "residual" not in changes
+}
+# What else a chart varies, one option after the other.
+OPTIONS: dict[str, dict[str, Changes]] = {
+    "levels of detail": {"no levels of detail": {"level_of_detail": False}},
+    "faces": {"several faces": {"single_face_tangent": 1.0}, "one face": {"single_face_tangent": 8.0}},
+    "termination": {"residual 0.0005": {"residual": 0.0005}, "residual 0.02": {"residual": 0.02}},
 }
 
 # Each against the default.

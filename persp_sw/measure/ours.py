@@ -48,25 +48,22 @@ class Ours:
         self.renderer.settings = self.settings
         return self.renderer.render(view)
 
-    def counts(self, stage: Stage, view: View) -> dict[str, Any]:
-        """Work and memory for one view: samples, waste, faces, bytes."""
+    def counts(self, stage: Stage, view: View, waste: bool = True) -> dict[str, Any]:
+        """Work and memory for one view: samples, waste (if wanted), faces, bytes."""
         self.renderer.settings = self.settings
         afresh = restart_peak()
         eye_image = self.renderer.composite(view.eye, [view.wall])
         self.renderer.warp(eye_image, view)
         last, peak = dict(self.renderer.last), peak_bytes()
-        needed = samples_that_count(
-            eye_image,
-            [view.wall],
-            stage.volume,
-            stage.transfer,
-            self.settings,
-            stage.regions,
-        )
+        report = {name: last[name] for name in _COUNTS}
+        if waste:
+            needed = samples_that_count(
+                eye_image, [view.wall], stage.volume, stage.transfer, self.settings, stage.regions
+            )
+            report["needed_samples"] = round(needed)
+            report["waste"] = last["samples"] / needed if needed else None
         return {
-            **{name: last[name] for name in _COUNTS},
-            "needed_samples": round(needed),
-            "waste": last["samples"] / needed if needed else None,
+            **report,
             "dense_bytes": stage.volume.data.nbytes,
             "peak_bytes": peak,
             "peak_of": "frame" if afresh else "process",

@@ -12,70 +12,101 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from .bench import Row
-from .chart import figures, time_at
+from .chart import figures
+from .front import front
 
 # Colours that most colour-blind people tell apart (Okabe and Ito).
 _COLOURS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#e69f00")
 _PEERS = {"vtk-fixed": "s", "vtk-fixed-2px": "D", "vtk-gpu": "^"}
+_BETTER = {"psnr": 1, "unlike": -1}
 _INK, _PALE = "#222222", "#888888"
+# Of a varied option; sampling modes as usual are dots on a line.
+_VARIED = ("D", "v", "^", "P", "X")
 _COLUMNS = 3
-_NAMED = (0.5, 1, 2, 4, 8)  # qualities
+_NAMED = (0.25, 0.5, 1, 2, 4)  # qualities
+_LEAST_UNLIKE = 1e-7  # 1 − SSIM of pictures that are all but equal
 
 
 def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
-    """A panel for each case; one curve a mode along the qualities, the best of all broad and grey, the peers.
+    """Two panels for each case, PSNR and SSIM over ms: a curve a sampling mode, the front, the peers.
 
     Parameters
     ----------
     panels
-        The rows of `chart.points_of`, case by case.
+        `chart.Chart.rows`, case by case.
     path
         .png, .svg or .pdf.
     """
     columns = min(_COLUMNS, len(panels))
     lines = -(-len(panels) // columns)
     with matplotlib.rc_context({"font.size": 9, "svg.fonttype": "none", "axes.unicode_minus": True}):
-        figure = Figure(figsize=(4.6 * columns, 3.9 * lines + 0.6), layout="constrained")
-        axes = figure.subplots(lines, columns, squeeze=False).ravel()
-        for axis, rows in zip(axes, panels, strict=False):
-            _panel(axis, rows)
-        for axis in axes[len(panels) :]:
-            axis.set_axis_off()
+        figure = Figure(figsize=(5.4 * columns, 6.2 * lines + 0.8), layout="constrained")
+        axes = figure.subplots(
+            2 * lines,
+            columns,
+            squeeze=False,
+            sharex="col" if lines == 1 else False,
+            height_ratios=[3, 2] * lines,
+        )
+        varied = list(
+            dict.fromkeys(name for rows in panels for row in rows for name in row.get("varied", ()))
+        )
+        for index in range(lines * columns):
+            line, column = divmod(index, columns)
+            upper, lower = axes[2 * line, column], axes[2 * line + 1, column]
+            if index >= len(panels):
+                upper.set_axis_off()
+                lower.set_axis_off()
+                continue
+            rows = [_with_unlike(row) for row in panels[index]]
+            _panel(upper, rows, "psnr", varied)
+            _panel(lower, rows, "unlike", varied)
+            upper.set_title(rows[0]["case"], loc="left", fontweight="bold", fontsize=10)
+            lower.set_xlim(upper.get_xlim())
+            threads = rows[0]["threads"]
+            lower.set_xlabel(f"ms a frame, {threads} thread{'s' * (threads > 1)}")
         handles: dict[str, object] = {}
-        for axis in axes:
+        for axis in axes.ravel():
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
                 handles.setdefault(label, handle)
         figure.legend(
             handles.values(),
             handles.keys(),
             loc="outside lower center",
-            ncols=3 * columns,
+            ncols=min(len(handles), 3 * columns),
             frameon=False,
             fontsize=8.5,
         )
         figure.savefig(path, dpi=160)
 
 
-def _panel(axis: Axes, rows: Sequence[Row]) -> None:
+def _with_unlike(row: Row) -> Row:
+    """With 1 − SSIM, which has more to tell than SSIM where pictures are good."""
+    return {**row, "unlike": max(1 - row["ssim"], _LEAST_UNLIKE)}
+
+
+def _panel(axis: Axes, rows: Sequence[Row], figure: str, varied: Sequence[str]) -> None:
+    """One figure of merit, "psnr" or "unlike", over the time of a frame."""
     ours = [row for row in rows if "mode" in row]
     peers = [row for row in rows if row["renderer"] != "persp_sw"]
-    best = sorted((row for row in ours if row["on_front"]), key=lambda row: row["ms"])
-    accuracies = np.linspace(min(row["psnr"] for row in best), max(row["psnr"] for row in best), 300)
+    best = [ours[n] for n in front([r["ms"] for r in ours], [r[figure] * _BETTER[figure] for r in ours])]
     axis.plot(
-        [time_at(psnr, ours) for psnr in accuracies],
-        accuracies,
+        [row["ms"] for row in best],
+        [row[figure] for row in best],
         color=_INK,
-        linewidth=4,
+        linewidth=7,
         alpha=0.15,
         solid_capstyle="round",
-        label="best of ours",
+        solid_joinstyle="round",
+        label="front: none is faster and better",
         zorder=1,
     )
-    for colour, mode in zip(_COLOURS, dict.fromkeys(row["mode"] for row in ours), strict=False):
-        curve = sorted((row for row in ours if row["mode"] == mode), key=lambda row: row["quality"])
+    for colour, mode in zip(_COLOURS, dict.fromkeys(row["sampling"] for row in ours), strict=False):
+        of_mode = sorted((row for row in ours if row["sampling"] == mode), key=lambda row: row["quality"])
+        curve = [row for row in of_mode if not row["varied"]]
         axis.plot(
             [row["ms"] for row in curve],
-            [row["psnr"] for row in curve],
+            [row[figure] for row in curve],
             "o-",
             color=colour,
             markersize=3.5,
@@ -83,8 +114,28 @@ def _panel(axis: Axes, rows: Sequence[Row]) -> None:
             label=mode,
             zorder=3,
         )
-    _name_qualities(axis, best)
-    _draw_peers(axis, peers, rows)
+        for row in of_mode:  # what is varied is shown where it is of use
+            if row["varied"] and row in best:
+                marker = _VARIED[varied.index(row["varied"][-1]) % len(_VARIED)]
+                axis.plot(row["ms"], row[figure], marker, color=colour, markersize=5.5, mfc="white", zorder=4)
+    if figure == "psnr":
+        for marker, name in zip(_VARIED, varied, strict=False):
+            if any(name in row["varied"] for row in best):
+                axis.plot([], [], marker, color=_INK, markersize=5.5, mfc="white", label=name)
+        _name_qualities(axis, best)
+        _draw_peers(axis, peers, rows)
+        axis.set_ylabel("PSNR, dB")
+    else:
+        for row in peers:
+            axis.plot(
+                row["ms"], row[figure], _PEERS.get(row["renderer"], "*"), color=_INK, markersize=6, zorder=4
+            )
+        axis.set_yscale("log")
+        axis.invert_yaxis()
+        axis.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5), numticks=9))
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda unlike, _: f"{1 - unlike:.7g}"))
+        axis.yaxis.set_minor_formatter(NullFormatter())
+        axis.set_ylabel("SSIM")
     axis.set_xscale("log")
     axis.xaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5)))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda ms, _: f"{ms:g}"))
@@ -93,19 +144,17 @@ def _panel(axis: Axes, rows: Sequence[Row]) -> None:
     axis.grid(True, which="major", color="#e4e4e4", linewidth=0.7)
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
-    threads = rows[0]["threads"]
-    axis.set_title(rows[0]["case"], loc="left", fontweight="bold", fontsize=9.5)
-    axis.set_xlabel(f"ms a frame, {threads} thread{'s' * (threads > 1)}")
-    axis.set_ylabel("PSNR, dB")
 
 
 def _name_qualities(axis: Axes, best: Sequence[Row]) -> None:
     """The quality beside some points of the front."""
     named: list[Row] = []
-    for row in best:
-        same = [other for other in named if other["quality"] == row["quality"]]
-        beside = any(abs(np.log(row["ms"] / other["ms"])) < 0.05 for other in same)
-        if row["quality"] in _NAMED and not beside:
+    for n, row in enumerate(best):
+        beside = any(abs(np.log(row["ms"] / other["ms"])) < 0.12 for other in named)
+        again = any(
+            (other["mode"], other["quality"]) == (row["sampling"], row["quality"]) for other in best[:n]
+        )
+        if row["quality"] in _NAMED and not beside and not again:
             named.append(row)
             axis.annotate(
                 f"{row['quality']:g}",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
 from math import exp, isfinite, log
@@ -16,7 +17,7 @@ from zlib import crc32
 from ..errors import SettingsError
 from ..settings import Settings
 
-FORMAT = 1
+FORMAT = 2
 
 
 @dataclass(frozen=True)
@@ -87,6 +88,8 @@ class Ladder:
     ----------
     machine, volume
         What it was measured on; empty for the built-in ladder, which fits all.
+    program
+        Which version of the program was measured.
 
     Raises
     ------
@@ -97,6 +100,7 @@ class Ladder:
     rungs: tuple[Rung, ...]
     machine: str = ""
     volume: str = ""
+    program: str = ""
 
     def __post_init__(self):
         problems = [problem for rung in self.rungs for problem in _problems_of(rung)]
@@ -123,7 +127,7 @@ class Ladder:
         return cls((Rung("as set", {}, tuple(Point(q, c) for q, c in _DEFAULT)),))
 
     def limited(self, lowest: float, highest: float) -> Ladder:
-        """The rungs' parts between two qualities.
+        """The rungs' parts between two qualities; what then goes beyond no other rung is left out.
 
         Raises
         ------
@@ -133,7 +137,7 @@ class Ladder:
         kept = [rung for r in self.rungs if (rung := r.limited(lowest, highest)) is not None]
         if not kept:
             raise SettingsError(f"no rung has qualities between {lowest:g} and {highest:g}: widen the limits")
-        return replace(self, rungs=tuple(kept))
+        return replace(self, rungs=ascending(kept))
 
     def fits(self, machine: str, volume: str) -> bool:
         """Whether it was measured on this machine and volume."""
@@ -143,9 +147,12 @@ class Ladder:
         """Write it where `load` looks for it; returns the file's path."""
         path = _path(folder, self.machine, self.volume)
         path.parent.mkdir(parents=True, exist_ok=True)
-        contents = {"format": FORMAT, "machine": self.machine, "volume": self.volume}
+        contents: dict[str, Any] = {"format": FORMAT}
+        contents |= {name: getattr(self, name) for name in ("machine", "volume", "program")}
         contents["rungs"] = [asdict(replace(rung, changes=dict(rung.changes))) for rung in self.rungs]
-        path.write_text(json.dumps(contents, indent=1) + "\n", encoding="utf-8")
+        part = path.with_name(f"{path.stem}-{os.getpid()}.part")
+        part.write_text(json.dumps(contents, indent=1) + "\n", encoding="utf-8")
+        part.replace(path)  # whole or not at all
         return path
 
     @classmethod
@@ -168,38 +175,20 @@ class Ladder:
                 Rung(r["name"], dict(r["changes"]), tuple(Point(**point) for point in r["points"]))
                 for r in contents["rungs"]
             ]
-            ladder = cls(tuple(rungs), contents["machine"], contents["volume"])
-        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            names = (str(contents[name]) for name in ("machine", "volume", "program"))
+            ladder = cls(tuple(rungs), *names)
+        except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
             raise SettingsError(f"{path} is no ladder of settings ({error}); delete it") from None
         return ladder if ladder.fits(machine, volume) else cls.default()
 
 
-def ladder_from_points(
-    points: Sequence[tuple[str, Mapping[str, Any], Point]], machine: str = "", volume: str = ""
-) -> Ladder:
-    """A ladder of the measured front: (way's name, its changes, point), in any order.
-
-    Ways with a single point on the front are left out, for there is nothing to walk; so are those that do not
-    overlap in cost with the one before, or do not go beyond it.
-
-    Raises
-    ------
-    SettingsError
-        No way has two points.
-    """
-    ways: dict[str, Rung] = {}
-    for name, changes, point in sorted(points, key=lambda item: item[2].cost):
-        known = ways.get(name, Rung(name, changes, ()))
-        if not known.points or point.quality > known.highest:
-            ways[name] = replace(known, points=(*known.points, point))
-    rungs: list[Rung] = []
-    for rung in sorted(ways.values(), key=lambda r: (r.points[0].cost, r.name)):
-        low, high = rung.points[0].cost, rung.points[-1].cost
-        if len(rung.points) < 2 or (rungs and not rungs[-1].points[-1].cost < high):
-            continue
-        if not rungs or rungs[-1].points[0].cost < low < rungs[-1].points[-1].cost:
-            rungs.append(rung)
-    return Ladder(tuple(rungs), machine, volume)
+def ascending(rungs: Iterable[Rung]) -> tuple[Rung, ...]:
+    """Those that begin and end at a higher cost than the one kept before them."""
+    kept: list[Rung] = []
+    for rung in rungs:
+        if not kept or all(kept[-1].points[end].cost < rung.points[end].cost for end in (0, -1)):
+            kept.append(rung)
+    return tuple(kept)
 
 
 # (quality, cost relative to quality 1)
