@@ -22,6 +22,14 @@ def pytest_report_header() -> str:
     )
 
 
+@pytest.fixture(autouse=True, scope="session")
+def no_ladders_of_the_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests neither use nor leave what `persp-sw chart` keeps for this machine."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_DATA_HOME", str(tmp_path_factory.mktemp("data")))
+        yield
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     """The same numbers in every run."""

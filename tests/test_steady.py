@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import persp_sw as psw
+from persp_sw.quality import saved_ladder
+from persp_sw.quality.ladder import Point, Rung
 from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.eyes import eyes_of_head
 from vr_plugin.frame import FrameMaker
@@ -136,6 +138,17 @@ def test_limits_that_leave_no_choice_need_no_controller(maker):
     assert controller.target_ms == 20
     rung = controller.ladder.rungs[0]
     assert (rung.lowest, rung.highest) == (0.5, 1.5)
+
+
+def test_a_measured_ladder_is_walked_unless_the_user_chose_the_sampling(maker, tmp_path, monkeypatch):
+    rungs = (Rung("fast", {"residual": 0.1}, (Point(0.25, 0.1), Point(2.0, 4.0))),)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    renderer, aim = maker.renderer, QualityAim(60, 1, 0.25, 2.0)
+    key = saved_ladder.machine_key(None), saved_ladder.volume_key(renderer.volume, renderer.transfer)
+    saved_ladder.save_ladder(psw.Ladder(rungs, *key, saved_ladder.program_key()))
+    assert [rung.name for rung in controller_for(renderer, aim, 60).ladder.rungs] == ["fast"]
+    renderer.settings = replace(renderer.settings, samples_per_interval=2)
+    assert [rung.changes for rung in controller_for(renderer, aim, 60).ladder.rungs] == [{}]
 
 
 def record(maker, frame_ms=10.0, shown_at=None, on_display=True, stamp=5.0):
