@@ -28,6 +28,7 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from PIL import Image
 
 import persp_sw as psw
 from persp_sw.geometry.placement import depth_range
@@ -40,6 +41,11 @@ WAYS = {0: "middle of the box", 1: "measured depth", 2: "2 slabs", 4: "4 slabs",
 SHIFTS = (0.0, 5.0, 10.0, 20.0)  # mm
 TOWARDS = np.array((0.42, 0.27, 0.87)) / np.linalg.norm((0.42, 0.27, 0.87))
 MARGIN = 1.25  # of the wall composited for
+SKIN = [
+    *((0, (0, 0, 0), 0), (45, (0.9, 0.5, 0.35), 0), (70, (0.9, 0.5, 0.35), 0.03)),
+    *((120, (0.9, 0.7, 0.5), 0.03), (160, (1, 0.97, 0.9), 0.5), (215, (0.7, 0.8, 1), 0.5)),
+    (255, (0.4, 0.6, 1), 0.8),
+]
 MARCH = 0.25  # voxels a sample of the exact depths
 RAYS = 48  # a side
 
@@ -184,6 +190,24 @@ def case(name, function, inside, options, folder, truths):
         print(cells, flush=True)
 
 
+def picture(path: Path):
+    """The truth, one plane and four slabs for a head 20 mm to the right; below, the old view, errors × 4."""
+    volume = volume_named("ct128", None)
+    transfer = psw.TransferFunction(SKIN, min(volume.spacing))
+    view, unit = own_view(volume, False, 300)
+    view = psw.View.look_at(view.eye.position, volume.centre, (0, 1, 0), 30, (300, 300))
+    walls, moved = [grown(view.wall, MARGIN)], moved_views(view, 0.02 * unit)[0]
+    renderer = psw.Renderer(volume, transfer, psw.Settings(quality=2))
+    fresh = renderer.warp(renderer.composite(moved.eye, walls), moved)
+    top, bottom = [fresh], [renderer.warp(renderer.composite(view.eye, walls), view)]
+    for count in (1, 4):
+        renderer.settings = psw.Settings(quality=2, depth_slabs=count)
+        top.append(renderer.warp(renderer.composite(view.eye, walls), moved))
+        bottom.append(4 * np.abs(top[-1] - fresh))
+    colours = np.vstack([np.hstack(top), np.hstack(bottom)])[..., :3]
+    Image.fromarray((255 * colours.clip(0, 1) ** (1 / 2.2)).astype(np.uint8)).save(path)
+
+
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -196,7 +220,10 @@ def main():
     parser.add_argument("--runs", type=int, default=15, help="for times")
     parser.add_argument("--cache", type=Path, help="folder of reference pictures")
     parser.add_argument("--no-truth", action="store_true", help="no reference pictures, which take minutes")
+    parser.add_argument("--picture", type=Path, metavar="PNG", help="write the picture of docs/rewarp.md")
     options = parser.parse_args()
+    if options.picture:
+        return picture(options.picture)
     truths = None if options.no_truth else Truths(options.cache) if options.cache else Truths()
     folder = data_folder(options.data)
     for name in options.volumes:
