@@ -78,29 +78,34 @@ def test_a_display_shows_the_eyes_of_one_moment_from_where_the_head_is(loop):
                 assert picture.image is shown.frame.images[picture.eye]
 
 
-def test_a_head_mounted_display_has_a_margin_for_a_head_that_turns(loop):
-    """Turned by 1.6° since, a display full of fog shows fog up to its edges."""
+@pytest.mark.parametrize(("fixed_to", "shift", "turn_deg"), [("head", 0.0, 1.6), ("room", 0.0038, 0.0)])
+def test_walls_have_margins_for_a_head_that_moves_on(loop, fixed_to, shift, turn_deg):
+    """Fog is all around: a wall is full of it up to its edges, wherever the head went since."""
     fog = psw.Volume(np.full((64, 64, 64), 200, np.uint8))
     transfer = psw.TransferFunction([(0, (1, 1, 1), 0.02), (255, (1, 1, 1), 0.02)], opacity_unit=1.0)
-    lens = psw.Wall((-1, -1, -1), (1, -1, -1), (-1, 1, -1), pixels=(64, 64), name="lens")
-    rig = replace(loop.rig, walls=[RigWall(lens, "left", fixed_to="head")])
-    hmd = Loop(rig, psw.Renderer(fog, transfer, psw.Settings(quality=2)), Head())
-    hmd.tracker.at = (hmd.maker.room_from_world @ (*fog.centre, 1))[:3]
-    with Beside(hmd, PERIOD) as beside:
+    wall = psw.Wall((-0.2, -0.2, -0.2), (0.2, -0.2, -0.2), (-0.2, 0.2, -0.2), pixels=(512, 512), name="wall")
+    if fixed_to == "room":
+        lower, across = np.array((-0.2, 0.8, -0.2)), 0.4
+        corners = lower, lower + (across, 0, 0), lower + (0, across, 0)
+        wall = psw.Wall(*corners, pixels=(512, 512), name="wall")
+    placement = replace(loop.rig.placement, size=8.0, centre=(0.0, 1.0, 0.0))
+    rig = replace(loop.rig, walls=[RigWall(wall, "left", fixed_to=fixed_to)], placement=placement)
+    other = Loop(rig, psw.Renderer(fog, transfer, psw.Settings(quality=8)), Head())
+    other.tracker.at = np.array([0.0, 1.0, 0.0])
+    with Beside(other, PERIOD) as beside:
         display = Display(beside)
         display.show(3)
-        moment, turn = hmd.maker.moment, np.radians(1.6)
+        moment, half = other.maker.moment, np.radians(turn_deg) / 2
 
-        def turned(head, eyes, *rest, **more):
-            return moment(
-                replace(head, orientation=(0, np.sin(turn / 2), 0, np.cos(turn / 2))), eyes, *rest, **more
-            )
+        def moved(head, eyes, *rest, **more):
+            there = Pose(head.position + (shift, 0, 0), (0, np.sin(half), 0, np.cos(half)))
+            return moment(there, eyes_of_head(there, rig.eyes), *rest, **more)
 
-        hmd.maker.moment = turned
+        other.maker.moment = moved
         shown = beside.show(display.now + PERIOD)
         (picture,) = shown.pictures
-        assert shown.frame.moment.head.orientation[1] == 0.0
-        image = hmd.renderer.warp(picture.image, picture.view)
+        assert shown.frame.head.orientation[1] == shown.frame.head.position[0] == 0.0
+        image = other.renderer.warp(picture.image, picture.view)
         assert image[..., 3].min() > 0.5 * image[..., 3].max()
 
 

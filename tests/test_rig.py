@@ -102,7 +102,7 @@ def test_measured_numbers_may_be_rounded(rng):
     assert flaw_of(np.round(matrix, 3)) is None
 
 
-def test_a_head_s_wall_is_widened_all_around_and_a_room_s_is_not():
+def test_a_wall_is_widened_all_around():
     wall = psw.Wall((-1, -2, -3), (3, -2, -3), (-1, 4, -3), pixels=(400, 300), name="lens")
     head = RigWall(wall, fixed_to="head")
     wide = head.widened(0.1).wall
@@ -111,5 +111,3 @@ def test_a_head_s_wall_is_widened_all_around_and_a_room_s_is_not():
     np.testing.assert_allclose(wide.upper_left, (-1.4, 4.6, -3))
     assert wide.pixels == (480, 360) and wide.name == "lens"
     assert head.widened(0.0) is head
-    room = RigWall(wall)
-    assert room.widened(0.1) is room

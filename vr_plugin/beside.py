@@ -16,9 +16,10 @@ from .rest_watch import RestWatch
 from .shown import Shown
 from .worker import Worker
 
-# Of a head's walls: at the edge of a display of 90° that is 1.7°, as much as a head that turns by 100° a
-# second goes in a period of 60 Hz. Prediction leaves less.
-_MARGIN = 0.03
+# Parts of walls' sizes by what they are fixed to. A head's: at the edge of a display of 90° that is 1.7°, as
+# much as a head that turns by 100° a second goes in a period of 60 Hz; prediction leaves less. A room's: what
+# one sees past the edges of a wall of 2 m, of things however far, when one moves by 20 mm.
+_MARGINS = {"head": 0.03, "room": 0.01}
 # Part of the way from the old mean to a new time of compositing.
 _FOLLOW = 0.3
 
@@ -102,7 +103,7 @@ class Beside:
         self.close()
 
     def _ask(self, now: float) -> None:
-        moment = self.loop.moment(now + self.period_s + self._making_s, _MARGIN)
+        moment = self.loop.moment(now + self.period_s + self._making_s, _MARGINS)
         wanted = self.loop.steady.base, self.loop.steady.held
         if self._rest.look(moment, now):
             order = Order(self._rest.anchor, wanted, resting=True)

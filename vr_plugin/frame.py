@@ -166,7 +166,7 @@ class FrameMaker:
         eyes: EyePair,
         near: float = 0.0,
         modes: Mapping[str, str] = _NONE,
-        margin: float = 0.0,
+        margins: Mapping[str, float] = MappingProxyType({}),
         **more: Any,
     ) -> Moment:
         """What each eye sees on which wall; no pixel yet.
@@ -177,13 +177,14 @@ class FrameMaker:
             Metres before each eye in which nothing is shown.
         modes
             Stereo modes by wall name, where not the rig's own.
-        margin
-            By which a head's walls are widened: `RigWall.widened`.
+        margins
+            By which walls are widened (`RigWall.widened`), by what they are fixed to.
         more
             What else the moment knows: its regions, its stamp.
         """
         shown = {wall.name: eyes_of(modes.get(wall.name, wall.stereo)) for wall in self.walls}
-        walls = [(wall, self._in_world(wall.widened(margin).in_room(head))) for wall in self.walls]
+        wide = [(wall, wall.widened(margins.get(wall.fixed_to, 0.0))) for wall in self.walls]
+        walls = [(wall, self._in_world(widened.in_room(head))) for wall, widened in wide]
         sights, edge_on = {}, []
         for name in dict.fromkeys(name for names in shown.values() for name in names):
             eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)

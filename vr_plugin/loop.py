@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -96,10 +97,10 @@ class Loop:
             clip = (*self._regions.clip, *self.wand.clip_planes)
             self.regions = replace(self._regions, clip=clip)
 
-    def moment(self, shown_at: float, margin: float = 0.0) -> Moment:
+    def moment(self, shown_at: float, margins: Mapping[str, float] = MappingProxyType({})) -> Moment:
         """What the eyes see at a time that may lie ahead: the head goes on as it moves.
 
-        `margin`: of a head's walls, see `RigWall.widened`.
+        `margins`: see `FrameMaker.moment`.
         """
         head = self.head.pose_at(shown_at)
         eyes = eyes_of_head(head, self.rig.eyes)
@@ -108,7 +109,7 @@ class Loop:
             eyes,
             self.rig.eyes.near,
             self.modes,
-            margin,
+            margins,
             regions=self.regions,
             stamp=self.head.stamp,
         )

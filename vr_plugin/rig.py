@@ -77,11 +77,11 @@ class RigWall:
         return psw.Wall(*corners, pixels=w.pixels, name=w.name)
 
     def widened(self, share: float) -> RigWall:
-        """A head's wall with a margin all around, `share` of its width and height; a room's wall as it is.
+        """The wall with a margin all around, `share` of its width and height, its pixels as large as before.
 
-        What eye images are composited for that will be shown to a head that has turned since.
+        What eye images are composited for that will be shown to a head that has moved since.
         """
-        if self.fixed_to == "room" or share == 0:
+        if share == 0:
             return self
         w = self.wall
         across, up = share * (w.lower_right - w.lower_left), share * (w.upper_left - w.lower_left)
