@@ -125,7 +125,9 @@ def is_near(truth: np.ndarray) -> Callable[[np.ndarray], bool]:
     return lambda picture: bool(np.abs(picture.astype(int) - truth).max() <= SCREEN_STEPS)
 
 
-@pytest.mark.parametrize("options", [(), ("--in-turn",)], ids=["beside", "in turn"])
+@pytest.mark.parametrize(
+    "options", [(), ("--in-turn",), ("--slabs", "3")], ids=["beside", "in turn", "slabs"]
+)
 def test_walls_keys_and_a_clean_end(display, files, options):  # noqa: F811
     stereo, mono = expected(files), expected(files, mono=True)
     assert np.abs(stereo.astype(int) - mono).max() > 40

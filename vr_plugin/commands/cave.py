@@ -72,6 +72,13 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
 )
 @click.option("--in-turn", is_flag=True, help="Windows wait for compositing, instead of going on beside it.")
 @click.option(
+    "--slabs",
+    type=click.IntRange(1, 8),
+    default=1,
+    show_default=True,
+    help="Depth slabs of eye images shown to a head that moved on; 2 … 4 pay in fog.",
+)
+@click.option(
     "--trace", "trace_file", type=click.Path(), help="Record every frame; see persp-sw trace --help."
 )
 @click.option("--unit", metavar="mm|cm|m|in|ft", help="Of the lengths in another system's wall file.")
@@ -96,6 +103,7 @@ def cave(
     judge: bool,
     adapt: bool | None,
     in_turn: bool,
+    slabs: int,
     trace_file: str | None,
     unit: str | None,
     machine: str | None,
@@ -126,6 +134,8 @@ def cave(
     with progress_bars() as progress:
         shown = open_scene(scene, progress, **keys)
         settings = settings_for(shown, quality, samples, residual, threads)
+        if not (offscreen or in_turn):  # else each image is shown to the eye it was made for
+            settings = replace(settings, depth_slabs=slabs)
         renderer = psw.Renderer(shown.volume, shown.transfer, settings, shown.regions, progress)
         tracker = open_tracker(
             chosen.tracker,
