@@ -26,6 +26,7 @@ from .tracker_events import TrackerEvents
 
 QUALITY_STEP = 2**0.25
 _PATIENCE_S = 0.002
+_UNSYNCED_MS = 1.0
 _RECORDS = 1000
 
 
@@ -188,6 +189,9 @@ class WindowLoop:
             begin, clock[-1], upload_ms, warp_ms, swap_ms, 1e3 * (clock[-1] - (self._end_s or begin))
         )
         self._end_s = clock[-1]
+        if swap_ms < _UNSYNCED_MS:
+            # No display to wait for: more frames than are wanted would take the time of compositing.
+            time.sleep(max(0.0, 1e-3 * self.target_ms - (clock[-1] - begin)))
         record = record_of(self.frames, shown, times, self.target_ms, on_display=True)
         self.records.append(record)
         self.frames += 1
