@@ -65,11 +65,13 @@ def test_what_is_hardly_better_makes_no_rung():
     assert [rung.name for rung in ladder_from_points([*A, *clearly]).rungs] == ["a", "b"]
 
 
-def test_a_way_that_is_a_little_better_between_does_not_come_twice():
-    between = way("b", (4, 16, 64), (43.5, 55.6, 67.3), (0.5, 1, 2))
-    names = [rung.name for rung in ladder_from_points([*A, *between]).rungs]
-    assert len(set(names)) == len(names)
-    assert "a" in names
+def test_a_way_that_is_best_in_two_stretches_makes_two_rungs():
+    between = way("b", (4, 16, 64), (45, 57, 67), (0.5, 1, 2))
+    ladder = ladder_from_points([*A, *between])
+    assert [rung.name for rung in ladder.rungs] == ["a", "b", "a (2)"]
+    one, _, again = ladder.rungs
+    assert one.changes == again.changes == CHANGES["a"]
+    assert one.lowest < one.highest < again.lowest < again.highest
 
 
 def test_a_gap_is_kept_and_stayed_below():

@@ -61,6 +61,8 @@ def ssim(image: Picture, truth: Picture) -> float:
     PerspSWError
         Pictures of different or too small a size.
 
+    Linear light over black, not what a screen shows: so it is as free of background and display as PSNR.
+
     Source: Wang, Bovik, Sheikh, Simoncelli, *Image quality assessment: from error visibility to structural
     similarity*, 2004, with their 11 × 11 Gaussian of deviation 1.5, K1 = 0.01, K2 = 0.03 and peak 1. Windows
     that leave the picture do not count; weighted variances are not corrected for bias, as there.

@@ -14,14 +14,18 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from .bench import Row
 from .chart import figures
 from .front import front
+from .modes import OPTIONS
 
 # Colours that most colour-blind people tell apart (Okabe and Ito).
 _COLOURS = ("#0072b2", "#009e73", "#d55e00", "#cc79a7", "#56b4e9", "#e69f00")
 _PEERS = {"vtk-fixed": "s", "vtk-fixed-2px": "D", "vtk-gpu": "^"}
 _BETTER = {"psnr": 1, "unlike": -1}
 _INK, _PALE = "#222222", "#888888"
-# Of a varied option; sampling modes as usual are dots on a line.
-_VARIED = ("D", "v", "^", "P", "X")
+# Of what is varied; sampling modes as usual are dots on a line.
+_SEVERAL = "several of these"
+_VARIED = dict(
+    zip([name for option in OPTIONS.values() for name in option] + [_SEVERAL], "DPXv<*", strict=True)
+)
 _COLUMNS = 3
 _NAMED = (0.25, 0.5, 1, 2, 4)  # qualities
 _LEAST_UNLIKE = 1e-7  # 1 − SSIM of pictures that are all but equal
@@ -29,6 +33,8 @@ _LEAST_UNLIKE = 1e-7  # 1 − SSIM of pictures that are all but equal
 
 def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
     """Two panels for each case, PSNR and SSIM over ms: a curve a sampling mode, the front, the peers.
+
+    Each panel has the front of its own figure, and of what is varied besides the sampling only what is on it.
 
     Parameters
     ----------
@@ -40,7 +46,9 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
     columns = min(_COLUMNS, len(panels))
     lines = -(-len(panels) // columns)
     with matplotlib.rc_context({"font.size": 9, "svg.fonttype": "none", "axes.unicode_minus": True}):
-        figure = Figure(figsize=(5.4 * columns, 6.2 * lines + 0.8), layout="constrained")
+        figure = Figure(
+            figsize=(5.4 * columns + 1.2 * (columns == 1), 6.2 * lines + 1.2), layout="constrained"
+        )
         axes = figure.subplots(
             2 * lines,
             columns,
@@ -48,9 +56,7 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
             sharex="col" if lines == 1 else False,
             height_ratios=[3, 2] * lines,
         )
-        varied = list(
-            dict.fromkeys(name for rows in panels for row in rows for name in row.get("varied", ()))
-        )
+        shown: set[str] = set()
         for index in range(lines * columns):
             line, column = divmod(index, columns)
             upper, lower = axes[2 * line, column], axes[2 * line + 1, column]
@@ -59,12 +65,15 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
                 lower.set_axis_off()
                 continue
             rows = [_with_unlike(row) for row in panels[index]]
-            _panel(upper, rows, "psnr", varied)
-            _panel(lower, rows, "unlike", varied)
+            shown |= {
+                _varied(row) for axis in ((upper, "psnr"), (lower, "unlike")) for row in _panel(*axis, rows)
+            }
             upper.set_title(rows[0]["case"], loc="left", fontweight="bold", fontsize=10)
             lower.set_xlim(upper.get_xlim())
             threads = rows[0]["threads"]
             lower.set_xlabel(f"ms a frame, {threads} thread{'s' * (threads > 1)}")
+        for name in (name for name in _VARIED if name in shown):
+            axes[0, 0].plot([], [], _VARIED[name], color=_INK, markersize=6.5, mfc="white", label=name)
         handles: dict[str, object] = {}
         for axis in axes.ravel():
             for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -73,7 +82,7 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
             handles.values(),
             handles.keys(),
             loc="outside lower center",
-            ncols=min(len(handles), 3 * columns),
+            ncols=2 * columns,
             frameon=False,
             fontsize=8.5,
         )
@@ -85,8 +94,13 @@ def _with_unlike(row: Row) -> Row:
     return {**row, "unlike": max(1 - row["ssim"], _LEAST_UNLIKE)}
 
 
-def _panel(axis: Axes, rows: Sequence[Row], figure: str, varied: Sequence[str]) -> None:
-    """One figure of merit, "psnr" or "unlike", over the time of a frame."""
+def _varied(row: Row) -> str:
+    """What is varied in a row of ours; empty where nothing is."""
+    return _SEVERAL if len(row["varied"]) > 1 else "".join(row["varied"])
+
+
+def _panel(axis: Axes, figure: str, rows: Sequence[Row]) -> list[Row]:
+    """One figure of merit, "psnr" or "unlike", over the time of a frame; returns its front."""
     ours = [row for row in rows if "mode" in row]
     peers = [row for row in rows if row["renderer"] != "persp_sw"]
     best = [ours[n] for n in front([r["ms"] for r in ours], [r[figure] * _BETTER[figure] for r in ours])]
@@ -116,12 +130,9 @@ def _panel(axis: Axes, rows: Sequence[Row], figure: str, varied: Sequence[str]) 
         )
         for row in of_mode:  # what is varied is shown where it is of use
             if row["varied"] and row in best:
-                marker = _VARIED[varied.index(row["varied"][-1]) % len(_VARIED)]
-                axis.plot(row["ms"], row[figure], marker, color=colour, markersize=5.5, mfc="white", zorder=4)
+                marker = _VARIED[_varied(row)]
+                axis.plot(row["ms"], row[figure], marker, color=colour, markersize=6.5, mfc="white", zorder=4)
     if figure == "psnr":
-        for marker, name in zip(_VARIED, varied, strict=False):
-            if any(name in row["varied"] for row in best):
-                axis.plot([], [], marker, color=_INK, markersize=5.5, mfc="white", label=name)
         _name_qualities(axis, best)
         _draw_peers(axis, peers, rows)
         axis.set_ylabel("PSNR, dB")
@@ -132,7 +143,9 @@ def _panel(axis: Axes, rows: Sequence[Row], figure: str, varied: Sequence[str]) 
             )
         axis.set_yscale("log")
         axis.invert_yaxis()
-        axis.yaxis.set_major_locator(LogLocator(10, subs=(1, 2, 5), numticks=9))
+        unlike = [row[figure] for row in rows]
+        few = max(unlike) > 300 * min(unlike)
+        axis.yaxis.set_major_locator(LogLocator(10, subs=(1,) if few else (1, 2, 5), numticks=9))
         axis.yaxis.set_major_formatter(FuncFormatter(lambda unlike, _: f"{1 - unlike:.7g}"))
         axis.yaxis.set_minor_formatter(NullFormatter())
         axis.set_ylabel("SSIM")
@@ -144,6 +157,11 @@ def _panel(axis: Axes, rows: Sequence[Row], figure: str, varied: Sequence[str]) 
     axis.grid(True, which="major", color="#e4e4e4", linewidth=0.7)
     axis.set_axisbelow(True)
     axis.spines[["top", "right"]].set_visible(False)
+    return best
+
+
+def _two_digits(ratio: float) -> str:
+    return f"{ratio:.2g}" if ratio < 99.5 else f"{float(f'{ratio:.2g}'):.0f}"
 
 
 def _name_qualities(axis: Axes, best: Sequence[Row]) -> None:
@@ -191,7 +209,7 @@ def _draw_peers(axis: Axes, peers: Sequence[Row], rows: Sequence[Row]) -> None:
                 zorder=2,
             )
         axis.annotate(
-            "not reached" if figure["ratio"] is None else f"{figure['ratio']:.2g} ×",
+            "not reached" if figure["ratio"] is None else f"{_two_digits(figure['ratio'])} ×",
             (row["ms"], row["psnr"]),
             xytext=(-6, 4),
             textcoords="offset points",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
+from itertools import groupby, pairwise
 from math import log
 from typing import Any
 
@@ -35,9 +35,10 @@ def ladder_from_points(
 
     At each cost the rung is the way of the highest PSNR there: between measured points a straight line over
     log(cost), beyond a way's last point as at that point. A way that is better by less than 0.5 dB · octaves
-    of cost makes no rung. Neighbours overlap by half an octave and more, as far as they were measured: so
-    points off the front count, too. Where the next way begins only beyond the last one's end there is a gap,
-    in which one stays on the lower rung.
+    of cost makes no rung; one that is best in two stretches makes two, the second named "NAME (2)".
+    Neighbours overlap by half an octave and more, as far as they were measured: so points off the front
+    count, too. Where the next way begins only beyond the last one's end there is a gap, in which one stays on
+    the lower rung.
 
     Raises
     ------
@@ -53,12 +54,15 @@ def ladder_from_points(
     ends = [cost for curve in curves for cost in (curve.costs[0], curve.costs[-1])]
     costs = np.linspace(min(ends), max(ends), _CELLS)
     rungs = []
-    for index, first, last in _best_path(curves, costs):
+    path = _best_path(curves, costs)
+    for place, (index, first, last) in enumerate(path):
         curve = curves[index]
         low = max(curve.costs[0], costs[first] - log(_OVERLAP))
         high = min(curve.costs[-1], costs[last] + log(_OVERLAP))
         if low < high:
-            rungs.append(_between(curve, low, high))
+            rung = _between(curve, low, high)
+            again = sum(other == index for other, _, _ in path[:place])
+            rungs.append(replace(rung, name=f"{rung.name} ({again + 1})") if again else rung)
     return Ladder(ascending(rungs), machine, volume, program)
 
 
@@ -106,7 +110,7 @@ def _curve(way: Rung) -> _Curve:
 def _best_path(curves: Sequence[_Curve], costs: np.ndarray) -> list[tuple[int, int, int]]:
     """(way, first, last cell): the way at each cost, of the largest sum of PSNR less the changes' price.
 
-    Dynamic programming (Viterbi), cell by cell. A way that comes twice has what lies between, too.
+    Dynamic programming (Viterbi), cell by cell.
     """
     values = np.array([curve.at(costs) for curve in curves])
     octaves = (costs[1] - costs[0]) / log(2)
@@ -121,14 +125,8 @@ def _best_path(curves: Sequence[_Curve], costs: np.ndarray) -> list[tuple[int, i
     for previous in reversed(came_from):
         path.append(int(previous[path[-1]]))
     path.reverse()
-    taken: list[tuple[int, int, int]] = []
-    for cell, way in enumerate(path):
-        known = next((n for n, (other, _, _) in enumerate(taken) if other == way), None)
-        if known is None:
-            taken.append((way, cell, cell))
-        else:
-            taken[known:] = [(way, taken[known][1], cell)]
-    return taken
+    changes = [0, *(n for n in range(1, len(path)) if path[n] != path[n - 1]), len(path)]
+    return [(path[first], first, end - 1) for first, end in pairwise(changes)]
 
 
 def _between(curve: _Curve, low: float, high: float) -> Rung:
