@@ -86,6 +86,9 @@ def test_points_that_are_worse_than_others_of_their_way_are_left_out():
     noisy = way("a", (1, 5, 4, 64, 60), (30, 41, 54, 66, 78))  # the second and fourth took too long
     (rung,) = ladder_from_points(noisy).rungs
     assert [point.quality for point in rung.points] == [0.25, 1.0, 4.0]
+    coarse = way("a", (1, 4, 5, 16), (30, 42, 43, 54), (0.25, 0.5, 0.4, 1))  # the third is good by chance
+    (rung,) = ladder_from_points(coarse).rungs
+    assert [point.quality for point in rung.points] == [0.25, 0.5, 1.0]
 
 
 def test_a_perfect_picture_is_a_point_like_others():
