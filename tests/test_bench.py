@@ -297,23 +297,27 @@ def test_the_charts_table(scene_file: Path, tmp_path: Path, ladders: Path):
     assert "no ladder was kept" in alone.stdout
 
 
-def test_two_views_make_one_ladder():
-    def row(mode, quality, ms, psnr):
-        return {
-            "mode": mode,
-            "quality": quality,
-            "composite_ms": ms,
-            "psnr": psnr,
-            "changes": {"residual": 0.01},
-        }
+def _row(mode, quality, ms, psnr, **changes):
+    changes = changes or {"residual": 0.01}
+    return {"mode": mode, "quality": quality, "composite_ms": ms, "psnr": psnr, "changes": changes}
 
-    one = [row("a", 0.5, 1.0, 30.0), row("a", 2.0, 4.0, 40.0), row("b", 1.0, 2.0, 60.0)]
-    two = [row("a", 0.5, 4.0, 20.0), row("a", 2.0, 9.0, 50.0), {"renderer": "peer"}]
+
+def test_two_views_make_one_ladder():
+    one = [_row("a", 0.5, 1.0, 30.0), _row("a", 2.0, 4.0, 40.0), _row("b", 1.0, 2.0, 60.0)]
+    two = [_row("a", 0.5, 4.0, 20.0), _row("a", 2.0, 9.0, 50.0), {"renderer": "peer"}]
     ladder = ladder_of([Chart(rows, [], "v") for rows in (one, two)], psw.Settings(threads=1))
     (rung,) = ladder.rungs
     assert (ladder.volume, rung.name, rung.changes) == ("v", "a", {"residual": 0.01})
     found = [value for point in rung.points for value in (point.quality, point.cost, point.psnr)]
     assert found == pytest.approx([0.5, 2.0, 25.0, 2.0, 6.0, 45.0])
+
+
+def test_what_flickers_in_motion_is_no_rung():
+    still = {"level_of_detail": False}
+    rows = [_row("a", 0.5, 1.0, 30.0), _row("a", 2.0, 4.0, 40.0)]
+    rows += [_row("a, no levels of detail", q, ms, 60.0 + q, **still) for q, ms in ((0.5, 1.0), (2.0, 4.0))]
+    ladder = ladder_of([Chart(rows, [], "v")], psw.Settings(threads=1))
+    assert [rung.name for rung in ladder.rungs] == ["a"]
 
 
 @pytest.mark.gl

@@ -89,7 +89,8 @@ def ladder_of(charts: Sequence[Chart], settings: Settings) -> Ladder:
     """The ladder of one or several views of one volume and transfer function.
 
     Costs are milliseconds of compositing. Of several views they are the geometric means, and accuracies the
-    means, of the settings that were measured in all.
+    means, of the settings that were measured in all. Ways without levels of detail make no rung: what they
+    gain in a still picture flickers in a moving one, which PSNR does not see.
 
     Raises
     ------
@@ -101,6 +102,8 @@ def ladder_of(charts: Sequence[Chart], settings: Settings) -> Ladder:
     points = []
     for key in shared:
         rows = [table[key] for table in tables]
+        if not rows[0]["changes"].get("level_of_detail", True):
+            continue
         cost = float(np.exp(np.mean([np.log(max(row["composite_ms"], 1e-6)) for row in rows])))
         accuracy = float(np.mean([row["psnr"] for row in rows]))
         points.append((key[0], rows[0]["changes"], Point(key[1], cost, accuracy)))
