@@ -369,6 +369,7 @@ def test_the_figures_say_what_was_measured(driver: Driver):
     statistics = {
         "composite_ms": 12.34, "warp_ms": 3.21, "warp": "texture", "samples": 1_234_567, "faces": 2,
         "intermediate_size": [192, 160], "compositings": 2, "samples_per_interval": 2, "preintegrated": True,
+        "quality": 1.414, "why": "", "target_hz": 0.0,
     }  # fmt: skip
     assert "-" in figures(driver.wait(0.0), statistics, rate).splitlines()[0]
     for seconds in (0.02, 0.02, 0.5):

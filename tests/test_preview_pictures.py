@@ -317,8 +317,9 @@ def test_opengl_draws_what_the_processor_draws(gl_context: psw.OffscreenContext,
     press(preview, keys + ("" if "H" in keys else " O"))
     preview.orbit(1.3 if keys == "TAB V R" else 0.0)  # a wall is seen from behind
     wanted, rate = preview.advance(0.0), Rate()
-    software, _ = software_frame(pictures, wanted, rate)
-    texture, figures = _TextureFrames(pictures)(pictures, wanted, rate)
+    done = pictures.composite(wanted)
+    software, _ = software_frame(pictures, wanted, done, rate)
+    texture, figures = _TextureFrames(pictures)(pictures, wanted, done, rate)
     assert figures["warp"] == "texture"
     error = np.abs(psw.images.srgb(software[..., :3]) - psw.images.srgb(texture[..., :3])).max(-1)
     if "TAB" in keys:

@@ -85,9 +85,9 @@ def preview(
     tmp_path: Path,
     request: pytest.FixtureRequest,
 ) -> Iterator[Preview]:
-    """The figures are off, for they change; pictures go to tmp_path."""
+    """Figures are off, for they change; quality stays; pictures go to tmp_path."""
     more = getattr(request, "param", ())
-    options = ("--press", "O", "--json", "-o", tmp_path, "--size", *SIZE, *more)
+    options = ("--press", "O", "--target", 0, "--json", "-o", tmp_path, "--size", *SIZE, *more)
     with Preview(display, volume_file, *options) as shown:
         number = shown.window(TITLE)
         shown.hand("windowmove", number, 0, 0)

@@ -107,7 +107,7 @@ class Beside:
         wanted = self.loop.steady.base, self.loop.steady.held
         if self._rest.look(moment, now):
             order = Order(self._rest.anchor, wanted, resting=True)
-            if self._is_asked(order) and (self._worker.is_busy or self._is_full):
+            if self._is_asked(order) and (self._worker.is_busy or self.loop.steady.is_refined):
                 return
         else:
             order = Order(moment, wanted)
@@ -121,11 +121,6 @@ class Beside:
             order.wanted,
             order.resting,
         )
-
-    @property
-    def _is_full(self) -> bool:
-        steady = self.loop.steady
-        return steady.refinement is None or steady.held is not None or steady.refinement.is_full
 
     def _is_useless(self, order: Order) -> bool:
         """Whether what is being composited is not worth waiting for; never twice in a row without a frame."""

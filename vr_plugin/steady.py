@@ -53,6 +53,11 @@ class Steady:
             self.controller.release()
         self.held = None
 
+    @property
+    def is_refined(self) -> bool:
+        """Whether a resting viewer's pictures would not become better than the last."""
+        return self.refinement is None or self.held is not None or self.refinement.is_full
+
     def make(self, moment: Moment, cancel: psw.Cancel | None = None, resting: bool = False) -> Frame:
         """The frame of a moment.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
+from click.core import ParameterSource
 
 from persp_sw.commands.options import (
     NAMES,
@@ -38,10 +39,13 @@ Examples:
   persp-sw view head.nrrd --rig configs/cave4.toml --path walk.csv.gz --outside
   persp-sw view head.nrrd --offscreen --frames 36 --turn 10 -o pictures
 
+In a window quality follows the frame rate of --target, and goes up to the most while nothing
+moves. A --quality that is given without --target is held until 0 is pressed.
+
 \b
 H or F1 in the window lists all keys: drag to orbit, wheel to zoom, F to fly with
-W A S D, 1 to 8 for stereo, Tab for the room from outside, P for a picture on disk,
-Esc to leave.
+W A S D, 1 to 8 for stereo, Tab for the room from outside, + and − to hold quality and 0 to
+let it go again, P for a picture on disk, Esc to leave.
 """
 _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 
@@ -70,11 +74,21 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
     show_default=True,
     help="Who draws the eye images: OpenGL or the processor.",
 )
+@click.option(
+    "--target",
+    "target_hz",
+    type=float,
+    metavar="HZ",
+    help="Frames a second to make room for by quality; 0: quality stays. [default: 30; offscreen 0]",
+)
 @click.option("--offscreen", is_flag=True, help="No window: write frames into the folder of -o.")
 @click.option("--frames", type=int, metavar="N", help="Leave after N frames; offscreen 1 by default.")
 @click.option("--press", "keys_pressed", metavar="KEYS", help="Press keys at the start, as 'TAB 8 O'.")
 @click.option(
     "--turn", type=float, default=0.0, metavar="DEGREES", help="Orbit by so much from frame to frame."
+)
+@click.option(
+    "--trace", "trace_file", type=click.Path(), help="Record every frame; see persp-sw trace --help."
 )
 @click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="Folder for pictures.")
 @tf_option
@@ -90,10 +104,12 @@ def view(
     outside: bool,
     recording: str | None,
     warp: str,
+    target_hz: float | None,
     offscreen: bool,
     frames: int | None,
     keys_pressed: str | None,
     turn: float,
+    trace_file: str | None,
     out: str,
     quality: float,
     samples: str | None,
@@ -109,6 +125,7 @@ def view(
     """
     import persp_sw as psw
 
+    from ..preview.recorder import TARGET_HZ, recorder_to
     from ..preview.run import FRAME_SECONDS, run_offscreen
     from ..preview.session import PreviewError, open_preview, press
 
@@ -117,6 +134,10 @@ def view(
     if frames is not None and frames < 1:
         raise PreviewError(f"--frames is at least 1; given {frames}")
     folder = psw.images.output_folder(out)
+    source = click.get_current_context().get_parameter_source("quality")
+    held = target_hz is None and source is ParameterSource.COMMANDLINE
+    if target_hz is None:
+        target_hz = 0.0 if offscreen else TARGET_HZ
     with progress_bars() as progress:
         chosen = open_scene(scene, progress, **keys)
         settings = settings_for(chosen, quality, samples, residual, threads)
@@ -128,35 +149,26 @@ def view(
             rig_file=rig_file,
             recording=recording,
             presets=NAMES,
+            target_hz=target_hz,
+            held=held,
             progress=progress,
         )
         press(preview, "TAB " * outside + (keys_pressed or ""))
         with patience():
             first = pictures.composite(preview.advance(-FRAME_SECONDS))
         say_missing_voxels(chosen.volume)
+        recording_to = recorder_to(trace_file, scene, settings, pictures.target_hz, preview.rig.quality)
+        common = {"folder": folder, "name": chosen.name, "turn": np.radians(turn), "warp": warp}
         if offscreen:
-            done = run_offscreen(
-                preview,
-                pictures,
-                frames=frames or 1,
-                folder=folder,
-                name=chosen.name,
-                turn=np.radians(turn),
-                warp=warp,
-                progress=progress,
-            )
+            with recording_to as recorder:
+                done = run_offscreen(
+                    preview, pictures, frames=frames or 1, recorder=recorder, progress=progress, **common
+                )
     if not offscreen:
         from ..preview.in_window import run_window
 
-        done = run_window(
-            preview,
-            pictures,
-            frames=frames,
-            folder=folder,
-            name=chosen.name,
-            turn=np.radians(turn),
-            warp=warp,
-        )
+        with recording_to as recorder:
+            done = run_window(preview, pictures, frames=frames, recorder=recorder, **common)
     values = report(done, chosen.name, first.statistics)
     if as_json:
         print_json(values)
@@ -193,7 +205,9 @@ def report(done: Run, name: str, first: Mapping[str, Any]) -> dict[str, Any]:
     rows = done.frames
     timed = rows[1:] or rows
     times = (
-        {key: median(row[key] for row in timed) for key in ("ms", "composite_ms", "warp_ms")} if timed else {}
+        {key: median(row[key] for row in timed) for key in ("ms", "composite_ms", "upload_ms", "warp_ms")}
+        if timed
+        else {}
     )
     last = (
         {} if not rows else {key: value for key, value in rows[-1].items() if key not in (*times, "picture")}
@@ -211,6 +225,8 @@ def report(done: Run, name: str, first: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _print(values: dict[str, Any]) -> None:
+    from ..preview.figures import quality_line
+
     if not values["frames"]:
         return
     facts = {
@@ -219,6 +235,8 @@ def _print(values: dict[str, Any]) -> None:
         "eye images": f"{values['compositings']} a frame, {numbers(values['intermediate_size'])} pixels, "
         f"{values['samples']:,} samples",
     }
+    if values["target_hz"]:
+        facts["quality"] = quality_line(values)
     files = values["pictures"] + values["screenshots"]
     if files:
         facts["pictures"] = files[0] if len(files) == 1 else f"{files[0]} … {files[-1]}, {len(files)} of them"

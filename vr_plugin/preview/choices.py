@@ -28,9 +28,15 @@ class Choices:
         scene's own, which then is one more.
     quality, stereo
         To start with.
+    follows
+        Whether there is a frame rate that quality can follow: then it does so, unless it is held.
+    held
+        Whether it is held from the start.
 
     Attributes
     ----------
+    drawn_quality
+        Of the last picture; who draws says so.
     stereo, separation, quality, preset, overlay, help, volume_outside, message
         As in `Wanted`; `stereo` as chosen, whether the screen can show it or not.
     quad_buffers
@@ -45,9 +51,14 @@ class Choices:
         preset: str | None = None,
         quality: float = 1.0,
         stereo: str = "mono",
+        *,
+        follows: bool = False,
+        held: bool = False,
     ):
         self._presets = list(dict.fromkeys([preset, *presets]))
-        self.preset, self.quality = preset, quality
+        self.preset, self.drawn_quality = preset, quality
+        self._free = None if follows else quality
+        self.quality = quality if held else self._free
         self.stereo, self.separation = Stereo(stereo), SEPARATION
         self.overlay, self.help, self.volume_outside = True, False, True
         self.quad_buffers = False
@@ -120,12 +131,20 @@ class Choices:
         self.separation = max(self.separation / SEPARATION_STEP, SEPARATIONS[0])
 
     def better(self) -> None:
-        """Finer pictures."""
-        self.quality = min(self.quality * QUALITY_STEP, QUALITIES[1])
+        """Finer pictures than the last, and no others."""
+        self._hold(QUALITY_STEP)
 
     def faster(self) -> None:
-        """Coarser pictures."""
-        self.quality = max(self.quality / QUALITY_STEP, QUALITIES[0])
+        """Coarser pictures than the last, and no others."""
+        self._hold(1 / QUALITY_STEP)
+
+    def release_quality(self) -> None:
+        """Quality follows the frame rate again; where there is none, it is what it was at first."""
+        self.quality = self._free
+
+    def _hold(self, factor: float) -> None:
+        now = self.drawn_quality if self.quality is None else self.quality
+        self.quality = min(max(now * factor, QUALITIES[0]), QUALITIES[1])
 
     def _step_preset(self, step: int) -> None:
         place = self._presets.index(self.preset) + step

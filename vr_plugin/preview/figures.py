@@ -57,7 +57,7 @@ def figures(wanted: Wanted, statistics: Mapping[str, Any], rate: Rate) -> str:
     ----------
     statistics
         Of all eye images together: composite_ms, warp_ms, warp (who did it), samples, faces,
-        intermediate_size, compositings, samples_per_interval, preintegrated.
+        intermediate_size, compositings, samples_per_interval, preintegrated; and what `quality_line` needs.
     """
     s = statistics
     faces, images, (width, height) = s["faces"], s["compositings"], s["intermediate_size"]
@@ -74,7 +74,7 @@ def figures(wanted: Wanted, statistics: Mapping[str, Any], rate: Rate) -> str:
         "warp": f"{s['warp_ms']:.1f} ms, {s['warp']}",
         "samples": f"{_short(s['samples'])}, {sampling}{', pre-integrated' * bool(s['preintegrated'])}",
         "faces": f"{faces}, {width} × {height} pixels",
-        "quality": f"{wanted.quality:.2g}",
+        "quality": quality_line(s),
         "stereo": stereo,
         "preset": wanted.preset or "the scene's own",
         "camera": camera,
@@ -86,6 +86,13 @@ def figures(wanted: Wanted, statistics: Mapping[str, Any], rate: Rate) -> str:
     lines["help"] = "H"
     width = max(map(len, lines))
     return "\n".join(f"{name:<{width}}  {text}" for name, text in lines.items())
+
+
+def quality_line(statistics: Mapping[str, Any]) -> str:
+    """A frame's quality, and why it is that: of `quality`, `why` (of its `Choice`) and `target_hz`."""
+    quality, why, target_hz = (statistics[name] for name in ("quality", "why", "target_hz"))
+    reason = {"": "", "held": ", held", "refined": ", refined at rest"}
+    return f"{quality:#.2g}{reason.get(why, f', follows {target_hz:g} Hz')}"
 
 
 def help_text() -> str:

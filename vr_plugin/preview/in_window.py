@@ -1,24 +1,39 @@
-"""The preview in a window: events in, frames out, until the user has seen enough."""
+"""The preview in a window: events in, frames out, until the user has seen enough.
+
+While something moves, eye images are composited in turn with drawing, as well as the frame rate allows. At
+rest a thread refines them, so that hands are answered at once: the loop goes on looking for events, and what
+is under way is given up when something moves.
+"""
 
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Iterable
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
+from ..record import Times
 from ..screen.events import Button, Closing, Event, Focus, Key, Pointer, Resized, Wheel
-from ..window import Windows
+from ..window import Window, Windows
+from ..worker import Worker
 from .controller import Preview
 from .figures import Rate
-from .pictures import PreviewPictures
+from .pictures import Composited, PreviewPictures
+from .recorder import Recorder
 from .run import Run, Screenshots, texts
+from .wanted import Wanted
+
+if TYPE_CHECKING:
+    from .screen import PreviewScreen
 
 _FRAMES_FOR_A_RATE = 3
 _REST_SECONDS = 0.25  # how long nothing happens before we look again whether something did
+_REFINING_SECONDS = 0.01  # how long before we look again whether a better picture is finished
 _log = logging.getLogger("persp_sw")
 
 
@@ -50,17 +65,22 @@ def run_window(
     frames: int | None = None,
     turn: float = 0.0,
     warp: str = "auto",
+    recorder: Recorder | None = None,
 ) -> Run:
     """Show the preview in a window until the user leaves, or for so many frames.
 
-    Frames are drawn while something moves; at rest the program waits.
+    Frames are drawn while something moves; at rest they are refined, then the program waits.
 
     Parameters
     ----------
+    frames
+        Composited and drawn, whether anything moves or not.
     turn
         Radians to orbit by from frame to frame; 0: hands alone move the view.
     warp
         "texture", "software", or "auto": the faster one, measured on the first frame.
+    recorder
+        Takes each frame.
 
     Raises
     ------
@@ -83,63 +103,173 @@ def run_window(
             preview.choices.quad_buffers = screen.has_quad_buffers
             if missing := preview.choices.say_missing_quad_buffers():
                 _log.warning("%s", missing)
-            pictures.progress = lambda done, total, what: window.set_title(
-                f"{name}: {what}, {100 * done // max(total, 1)} %"
-            )
-            return _loop(
-                preview,
-                pictures,
-                screen,
-                windows,
-                window,
-                Screenshots(preview, pictures, folder, name),
-                frames,
-                turn,
-                warp,
-            )
+            shots = Screenshots(preview, pictures, folder, name)
+            loop = PreviewLoop(preview, pictures, screen, windows, window, shots, recorder or Recorder())
+            loop.choose_warp = warp == "auto"
+            return loop.run(frames, turn)
         finally:
             if window.is_open:
                 window.make_current()
                 screen.close()
 
 
-def _loop(preview, pictures, screen, windows, window, shots, frames, turn, warp) -> Run:
-    rows: list[dict[str, Any]] = []
-    rate, kind, title, failed = Rate(), None, f"{window.name}: persp-sw view", set()
-    wait = 0.0
-    while not preview.finished and (frames is None or len(rows) < frames):
-        feed(preview, windows.poll(wait))
-        if rows and turn:
-            preview.orbit(turn)
-        start = perf_counter()
-        wanted = preview.advance(start)
-        # A rate is known, and shown, after a few frames of one kind.
-        needed = wanted.moving or frames is not None or rate.count < _FRAMES_FOR_A_RATE
-        if not window.is_drawn or not needed:
-            wait = _REST_SECONDS
-            continue
-        wait = 0.0
-        if kind != (kind := (wanted.outside, wanted.stereo, wanted.quality, wanted.preset, wanted.size)):
-            rate.clear()
+class PreviewLoop:
+    """Turns of a preview in one window; each looks for events, then does what is most urgent.
+
+    Attributes
+    ----------
+    rows
+        Figures of each frame that was composited in turn.
+    wait_s
+        How long the next turn may wait for events.
+    choose_warp
+        Measure which warp is faster, once.
+    """
+
+    def __init__(
+        self,
+        preview: Preview,
+        pictures: PreviewPictures,
+        screen: PreviewScreen,
+        windows: Windows,
+        window: Window,
+        shots: Screenshots,
+        recorder: Recorder,
+    ):
+        self.preview, self.pictures, self.screen = preview, pictures, screen
+        self.windows, self.window = windows, window
+        self.rows: list[dict[str, Any]] = []
+        self.wait_s, self.choose_warp = 0.0, False
+        self._shots, self._recorder, self._rate = shots, recorder, Rate()
+        # Whoever asks what drawing takes has to wait for it: OpenGL draws while the program goes on.
+        self._timed = pictures.target_hz > 0 or recorder.is_on
+        self._shown: Composited | None = None
+        self._shown_for: tuple[object, ...] = ()  # `Wanted.eye_images`
+        self._refiner: Worker[Wanted, Composited] | None = None
+        self._end_s: float | None = None  # of the last frame, where this one follows at once
+        self._kind: object = None
+        self._failed: set[type] = set()
+        self._title = f"{window.name}: persp-sw view"
+        pictures.progress = self._say_progress
+
+    def run(self, frames: int | None = None, turn: float = 0.0) -> Run:
+        """Until the user leaves, or for so many composited frames."""
         try:
-            done = pictures.composite(wanted)
-            window.make_current()
-            if warp == "auto":
-                warp = screen.choose_warp(wanted, done)
-            figures = screen.draw(
-                wanted, done, lambda s, wanted=wanted: texts(wanted, s, rate), first_row=window.first_row
-            )
-            windows.swap()
-            shots.write_if_asked(wanted)
+            while not self.preview.finished and (frames is None or len(self.rows) < frames):
+                feed(self.preview, self.windows.poll(self.wait_s))
+                if self.rows and turn:
+                    self.preview.orbit(turn)
+                self.turn(self.preview.advance(perf_counter()), always=frames is not None)
+        finally:
+            self._give_up_refining()
+        return Run(self.rows, self._shots.written)
+
+    def turn(self, wanted: Wanted, always: bool = False) -> None:
+        """Composite and show a frame, or refine the one shown, or do nothing and let the next turn wait.
+
+        Parameters
+        ----------
+        always
+            Composite, though nothing has changed.
+        """
+        self.wait_s = 0.0
+        kind = (wanted.outside, wanted.stereo, wanted.quality, wanted.preset, wanted.size)
+        try:
+            if not self.window.is_drawn:
+                self._give_up_refining()
+                self._pause(_REST_SECONDS)
+                return
+            if kind != self._kind:
+                self._kind = kind
+                self._rate.clear()
+            # A rate is known, and shown, after a few frames of one kind.
+            rated = self._rate.count >= _FRAMES_FOR_A_RATE
+            if always or not rated or wanted.eye_images != self._shown_for:
+                self._composite(wanted)
+            elif wanted.moving:  # texts
+                self._show(wanted, self._shown, is_new=False)
+            else:
+                self._refine(wanted)
         except PerspSWError as error:  # a place that has no picture: the next one may have
-            if type(error) not in failed:
-                failed.add(type(error))
+            if type(error) not in self._failed:
+                self._failed.add(type(error))
                 _log.warning("%s", error)
-            preview.say(str(error))
-            wait = _REST_SECONDS
-            continue
+            self.preview.say(str(error))
+            self._pause(_REST_SECONDS)
+
+    def _composite(self, wanted: Wanted) -> None:
+        self._give_up_refining()
+        begin = perf_counter()
+        done = self.pictures.composite(wanted)
+        figures = self._show(wanted, done, begin=begin)
+        seconds = perf_counter() - begin
+        self._rate.add(seconds)
+        self.rows.append({"ms": 1e3 * seconds, **figures})
+
+    def _refine(self, wanted: Wanted) -> None:
+        """Show a better picture where there is one, and have the next one made."""
+        if self._refiner is not None:
+            if self._refiner.is_busy:
+                self._pause(_REFINING_SECONDS)
+                return
+            done = self._refiner.newest()
+            if done is not None and done is not self._shown:
+                self._show(wanted, done)
+                return
+        if self.pictures.is_refined(wanted):
+            self._give_up_refining()
+            self._pause(_REST_SECONDS)
+            return
+        if self._refiner is None:
+            self._refiner = Worker(self._better, "refinement")
+        self._refiner.ask(wanted)
+        self._pause(_REFINING_SECONDS)
+
+    def _better(self, wanted: Wanted, cancel: psw.Cancel) -> Composited:
+        return self.pictures.composite(wanted, cancel, resting=True)
+
+    def _give_up_refining(self) -> None:
+        """At once: compositing looks whether it is cancelled many times a frame."""
+        refiner, self._refiner = self._refiner, None
+        if refiner is not None:
+            refiner.close()
+
+    def _show(
+        self, wanted: Wanted, done: Composited, *, begin: float | None = None, is_new: bool = True
+    ) -> dict[str, Any]:
+        """Draw it; its figures. `begin`: of its compositing, if the display waited for that."""
+        self.window.make_current()
+        if self.choose_warp:
+            self.screen.choose_warp(wanted, done)
+            self.choose_warp = False
+        start = perf_counter()
+        figures = self.screen.draw(
+            wanted, done, lambda s: texts(wanted, s, self._rate), first_row=self.window.first_row
+        )
+        if self._timed:
+            self.screen.finish()
+        drawn = perf_counter()
+        self.windows.swap()
+        end = perf_counter()
+        upload_ms = figures["upload_ms"]
+        warp_ms = 1e3 * (drawn - start) - upload_ms  # texts and all
+        begin = begin or start
+        frame_ms = 1e3 * (end - (self._end_s or begin))
+        times = Times(begin, end, upload_ms, warp_ms, 1e3 * (end - drawn), frame_ms)
+        self._recorder.add(done, times, is_new=is_new)
+        if is_new:
+            self.pictures.drawn(wanted, done, upload_ms, warp_ms)  # a swap does nothing but wait
+        self._shown, self._shown_for, self._end_s = done, wanted.eye_images, end
+        self.preview.choices.drawn_quality = figures["quality"]
         if figures["encode_ms"]:
-            window.set_title(title)
-        rate.add(perf_counter() - start)
-        rows.append({"ms": 1e3 * (perf_counter() - start), **figures})
-    return Run(rows, shots.written)
+            self.window.set_title(self._title)
+        self._shots.write_if_asked(wanted, done)
+        return figures
+
+    def _pause(self, seconds: float) -> None:
+        """Nothing to do for so long: the next frame does not follow at once."""
+        self.wait_s, self._end_s = seconds, None
+
+    def _say_progress(self, done: int, total: int, what: str) -> None:
+        if threading.current_thread() is threading.main_thread():  # windows belong to it
+            self.window.set_title(f"{self.window.name}: {what}, {100 * done // max(total, 1)} %")

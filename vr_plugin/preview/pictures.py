@@ -13,16 +13,20 @@ from numpy.typing import NDArray
 import persp_sw as psw
 
 from ..eyes import EyePair
-from ..frame import Frame, FrameMaker
+from ..frame import Frame, FrameMaker, Picture
+from ..moment import Moment
+from ..pacing import controller_for
 from ..placement import corners_in_room
 from ..pose import Pose
-from ..rig import Rig, RigWall
+from ..rig import QualityAim, Rig, RigWall
 from ..room import outside
 from ..room.painter import RoomPainter, encoded
+from ..steady import Steady
 from ..stereo import combine, eye_size
 from .wanted import Wanted
 
 WALL_PIXELS = 384  # of a wall's longer side in the view from outside
+_VISITOR = "visitor"  # the eye that sees the room
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,14 +37,15 @@ class Composited:
     ----------
     inside
         Of the camera's eyes, for the window; of the head's eyes, for the walls, in the view from outside.
+        Its images, statistics and cost are those of all eyes.
     outside
         Of the outside camera: the volume itself; None where it is not shown.
     statistics
-        Of all of them together, as `overlay.figures` needs them but for the warp.
+        Of all of them together, as `figures.figures` needs them but for the warp.
     """
 
     inside: Frame
-    outside: Frame | None
+    outside: Picture | None
     statistics: Mapping[str, Any]
 
 
@@ -50,7 +55,7 @@ class PreviewPictures:
     Parameters
     ----------
     renderer
-        Its quality and transfer function follow what is wanted.
+        Its quality and transfer function follow what is wanted, its other settings stay.
     transfer_of
         The transfer function of a preset's name; of None, the scene's own.
     rig, room_from_world
@@ -61,9 +66,13 @@ class PreviewPictures:
         World units before the camera's eyes in which nothing is shown.
     preset
         The name that the renderer's transfer function is of.
+    target_hz
+        The frame rate that quality follows, within the rig's limits; 0: none, it stays as it is.
 
     Attributes
     ----------
+    target_hz
+        0 also where the limits leave nothing to choose.
     progress
         Called with (done, total, what) while the volume is encoded.
     """
@@ -78,6 +87,7 @@ class PreviewPictures:
         background: np.ndarray = (0.0, 0.0, 0.0),
         near: float = 0.0,
         preset: str | None = None,
+        target_hz: float = 0.0,
     ):
         self.renderer = renderer
         self.rig = rig
@@ -85,38 +95,47 @@ class PreviewPictures:
         self.near = near
         self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
         self._transfer_of, self._preset = transfer_of, preset
-        self._window = FrameMaker(renderer, (), np.eye(4))
         self._canvases: dict[str, psw.Canvas] = {}
+        aim = QualityAim() if rig is None else rig.quality
+        self._inside = _steady(FrameMaker(renderer, (), np.eye(4)), aim, target_hz)
+        self.target_hz = target_hz if self._inside.controller else 0.0
         if rig is not None:
             walls = [replace(wall, wall=_smaller(wall.wall)) for wall in rig.walls]
             self._room = FrameMaker(renderer, walls, room_from_world)
             self._visitor = FrameMaker(renderer, (), room_from_world)
+            self._outside = _steady(self._room, aim, target_hz)
 
-    def composite(self, wanted: Wanted) -> Composited:
-        """The eye images for what is wanted; may encode (a new preset) and compile (the first time)."""
-        self._set_up(wanted)
-        mode = wanted.stereo.shown_mode
-        visitor = None
-        if wanted.outside:
-            # A wall for one eye, as in a head-mounted display, stays that eye's.
-            one_eye = {
-                wall.name: wall.stereo for wall in self._room.walls if wall.stereo in ("left", "right")
-            }
-            modes = dict.fromkeys((wall.name for wall in self._room.walls), mode) | one_eye
-            frame = self._room.make(wanted.head, wanted.head_eyes, self.rig.eyes.near, modes)
-            if wanted.volume_outside:
-                self._visitor.walls = (RigWall(wanted.camera.wall(wanted.size)),)
-                visitor = self._visitor.make(Pose(), _one_eye(wanted.camera.position))
-        else:
-            wall = wanted.camera.wall(wanted.size)
-            pixels = eye_size(mode, wanted.size)
-            wall = psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, "view")
-            self._window.walls = (RigWall(wall, mode),)
-            eyes = wanted.eyes
-            if mode == "mono":
-                eyes = _one_eye(wanted.camera.position)  # to the bit, whatever the separation
-            frame = self._window.make(Pose(), eyes, self.near)
-        return Composited(frame, visitor, _together([frame] + [visitor] * (visitor is not None)))
+    def composite(
+        self, wanted: Wanted, cancel: psw.Cancel | None = None, resting: bool = False
+    ) -> Composited:
+        """The eye images for what is wanted; may encode (a new preset) and compile (the first time).
+
+        Parameters
+        ----------
+        resting
+            Nothing moves: they may take longer than a frame, and become better from call to call.
+
+        Raises
+        ------
+        Cancelled
+            `cancel` was, meanwhile.
+        """
+        steady = self._set_up(wanted)
+        frame = steady.make(self._moment(wanted), cancel, resting)
+        walls = [picture for picture in frame.pictures if picture.eye != _VISITOR]
+        visitor = next((picture for picture in frame.pictures if picture.eye == _VISITOR), None)
+        made = frame.made
+        figures = {"quality": made.quality, "why": made.choice.why if made.choice else ""}
+        figures |= {"target_hz": self.target_hz, **_together(frame)}
+        return Composited(replace(frame, pictures=walls), visitor, figures)
+
+    def drawn(self, wanted: Wanted, done: Composited, upload_ms: float = 0.0, warp_ms: float = 0.0) -> None:
+        """What showing the eye images took, without the wait for the display: quality makes room for it."""
+        self._steady(wanted).drawn(done.inside, upload_ms, warp_ms)
+
+    def is_refined(self, wanted: Wanted) -> bool:
+        """Whether eye images would be no better for more time than a frame has."""
+        return self._steady(wanted).is_refined
 
     def draw(self, wanted: Wanted, done: Composited) -> tuple[dict[str, NDArray[np.float32]], float]:
         """Pictures by the names of eyes, as `Stereo.channels` has them, and the milliseconds that they took.
@@ -137,8 +156,7 @@ class PreviewPictures:
         walls = {wall.name: self._wall_picture(wall.name, wanted, done) for wall in self._room.walls}
         volume = None
         if done.outside is not None:
-            (seen,) = done.outside.pictures
-            volume = self.warp("visitor", seen.image, seen.view)
+            volume = self.warp(_VISITOR, done.outside.image, done.outside.view)
         painter = RoomPainter(wanted.camera, wanted.size, walls, volume)
         self.paint_room(painter, wanted, done)
         return painter.finished()
@@ -180,12 +198,48 @@ class PreviewPictures:
             canvas = self._canvases[slot] = psw.Canvas(*view.size)
         return self.renderer.warp(image, view, canvas)
 
-    def _set_up(self, wanted: Wanted) -> None:
-        if wanted.quality != self.renderer.settings.quality:
-            self.renderer.settings = replace(self.renderer.settings, quality=wanted.quality)
+    def _steady(self, wanted: Wanted) -> Steady:
+        return self._outside if wanted.outside else self._inside
+
+    def _set_up(self, wanted: Wanted) -> Steady:
+        steady = self._steady(wanted)
+        if wanted.quality is None and steady.held is not None:
+            steady.release()
+        elif wanted.quality != steady.held:
+            steady.hold(wanted.quality)
         if wanted.preset != self._preset:
             self._preset = wanted.preset
             self.renderer.transfer = self._transfer_of(wanted.preset)
+        return steady
+
+    def _moment(self, wanted: Wanted) -> Moment:
+        mode = wanted.stereo.shown_mode
+        if not wanted.outside:
+            wall = wanted.camera.wall(wanted.size)
+            pixels = eye_size(mode, wanted.size)
+            wall = psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, "view")
+            maker = self._inside.maker
+            maker.walls = (RigWall(wall, mode),)
+            eyes = wanted.eyes
+            if mode == "mono":
+                eyes = _one_eye(wanted.camera.position)  # to the bit, whatever the separation
+            return maker.moment(wanted.camera.pose, eyes, self.near)
+        # A wall for one eye, as in a head-mounted display, stays that eye's.
+        one_eye = {wall.name: wall.stereo for wall in self._room.walls if wall.stereo in ("left", "right")}
+        modes = dict.fromkeys((wall.name for wall in self._room.walls), mode) | one_eye
+        moment = self._room.moment(wanted.head, wanted.head_eyes, self.rig.eyes.near, modes)
+        if not wanted.volume_outside:
+            return moment
+        self._visitor.walls = (RigWall(wanted.camera.wall(wanted.size)),)
+        (seen,) = self._visitor.moment(Pose(), _one_eye(wanted.camera.position)).sights.values()
+        return replace(moment, sights={**moment.sights, _VISITOR: seen})
+
+
+def _steady(maker: FrameMaker, aim: QualityAim, target_hz: float) -> Steady:
+    controller = controller_for(maker.renderer, aim, target_hz) if target_hz else None
+    steady = Steady(maker, controller)
+    steady.refinement = psw.Refinement(controller.ladder) if controller else None
+    return steady
 
 
 def _one_eye(position: np.ndarray) -> EyePair:
@@ -199,16 +253,16 @@ def _smaller(wall: psw.Wall) -> psw.Wall:
     return psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, wall.name)
 
 
-def _together(frames: list[Frame]) -> dict[str, Any]:
+def _together(frame: Frame) -> dict[str, Any]:
     """The figures of several eye images as one."""
-    each = [s for frame in frames for s in frame.statistics.values()]
+    each = list(frame.statistics.values())
     sums = {key: sum(s[key] for s in each) for key in ("composite_ms", "encode_ms", "compile_ms", "samples")}
     largest = max((s["intermediate_size"] for s in each), key=lambda size: size[0] * size[1])
     return {
         **sums,
         "faces": max(s["faces"] for s in each),
         "intermediate_size": largest,
-        "compositings": sum(frame.compositings for frame in frames),
+        "compositings": frame.compositings,
         "samples_per_interval": each[-1]["samples_per_interval"],
         "preintegrated": each[-1]["preintegrated"],
     }

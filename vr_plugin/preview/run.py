@@ -14,11 +14,13 @@ from numpy.typing import NDArray
 import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
+from ..record import Times
 from ..screen.lettering import lay_over, squeezed, text_panel
 from ..stereo import eye_size
 from .controller import Preview
 from .figures import Rate, figures, fitting_letter, help_text
-from .pictures import PreviewPictures
+from .pictures import Composited, PreviewPictures
+from .recorder import Recorder
 from .wanted import Wanted
 
 FRAME_SECONDS = 1 / 60  # of frames without a screen: their time is counted, not measured
@@ -58,9 +60,14 @@ def lay_texts(
 
 
 def software_frame(
-    pictures: PreviewPictures, wanted: Wanted, rate: Rate
+    pictures: PreviewPictures, wanted: Wanted, done: Composited, rate: Rate
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
     """A frame as the window would show it, texts and all, without OpenGL.
+
+    Parameters
+    ----------
+    done
+        The eye images of what is wanted.
 
     Returns
     -------
@@ -69,9 +76,8 @@ def software_frame(
     statistics
         See `figures`.
     """
-    done = pictures.composite(wanted)
     drawn, warp_ms = pictures.draw(wanted, done)
-    statistics = {**done.statistics, "warp_ms": warp_ms, "warp": "software"}
+    statistics = {**done.statistics, "upload_ms": 0.0, "warp_ms": warp_ms, "warp": "software"}
     written = list(texts(wanted, statistics, rate))
     return pictures.window(wanted, lay_texts(wanted, written, drawn)), statistics
 
@@ -84,7 +90,7 @@ class Run(NamedTuple):
 
 
 class Screenshots:
-    """Pictures that the user asks for, drawn anew without texts over them, as files.
+    """Pictures that the user asks for, as files: what is shown, drawn anew without texts over it.
 
     Attributes
     ----------
@@ -98,12 +104,11 @@ class Screenshots:
         self._done = 0
         self.written: list[str] = []
 
-    def write_if_asked(self, wanted: Wanted) -> None:
-        """Write what is wanted now, if a picture has been asked for since the last time; and say so."""
+    def write_if_asked(self, wanted: Wanted, done: Composited) -> None:
+        """Write what is shown now, if a picture has been asked for since the last time; and say so."""
         if self._preview.choices.screenshots == self._done:
             return
         self._done = self._preview.choices.screenshots
-        done = self._pictures.composite(wanted)
         drawn, _ = self._pictures.draw(wanted, done)
         number = 1
         while (path := self._folder / f"{self._name}-view-{number:03d}.png").exists():
@@ -127,6 +132,7 @@ def run_offscreen(
     name: str,
     turn: float = 0.0,
     warp: str = "auto",
+    recorder: Recorder | None = None,
     progress: Callable[[int, int, str], None] = lambda done, total, what: None,
 ) -> Run:
     """Draw so many frames, a sixtieth of a second apart, and write each as NAME-0000.png, …
@@ -137,32 +143,43 @@ def run_offscreen(
         Radians to orbit by before each frame but the first.
     warp
         "texture" (OpenGL, without a screen), "software", or "auto": the software warp, which needs nothing.
+    recorder
+        Takes each frame.
     """
+    recorder = recorder or Recorder()
     if missing := preview.choices.say_missing_quad_buffers():
         _log.warning("%s", missing)
     if warp == "texture":
         with psw.OffscreenContext():
             return _run_offscreen(
-                preview, pictures, _TextureFrames(pictures), frames, folder, name, turn, progress
+                preview, pictures, _TextureFrames(pictures), frames, folder, name, turn, recorder, progress
             )
-    return _run_offscreen(preview, pictures, software_frame, frames, folder, name, turn, progress)
+    return _run_offscreen(preview, pictures, software_frame, frames, folder, name, turn, recorder, progress)
 
 
-def _run_offscreen(preview, pictures, frame_of, frames, folder, name, turn, progress) -> Run:
+def _run_offscreen(preview, pictures, frame_of, frames, folder, name, turn, recorder, progress) -> Run:
     rate, rows = Rate(), []
     shots = Screenshots(preview, pictures, folder, name)
     for number in range(frames):
         progress(number, frames, "frames")
         if number:
             preview.orbit(turn)
-        wanted = preview.advance(number * FRAME_SECONDS)
+        now = number * FRAME_SECONDS
+        wanted = preview.advance(now)
         start = perf_counter()
-        image, statistics = frame_of(pictures, wanted, rate)
-        seconds = perf_counter() - start
+        done = pictures.composite(wanted)
+        composited = perf_counter()
+        image, statistics = frame_of(pictures, wanted, done, rate)
+        end = perf_counter()
+        seconds, upload_ms = end - start, statistics["upload_ms"]
+        warp_ms = 1e3 * (end - composited) - upload_ms  # texts and all
+        pictures.drawn(wanted, done, upload_ms, warp_ms)
+        recorder.add(done, Times(now, now, upload_ms, warp_ms, 0.0, 1e3 * seconds), on_display=False)
+        preview.choices.drawn_quality = done.statistics["quality"]
         rate.add(seconds)
         path = psw.images.write(folder / f"{name}-{number:04d}.png", image)
         rows.append({"picture": str(path), "ms": 1e3 * seconds, **statistics})
-        shots.write_if_asked(wanted)
+        shots.write_if_asked(wanted, done)
         if preview.finished:
             break
     progress(frames, frames, "frames")
@@ -179,8 +196,9 @@ class _TextureFrames:
         self._screen = PreviewScreen(pictures)
         self._target = EyeTarget((1, 1), "float32")
 
-    def __call__(self, pictures: PreviewPictures, wanted: Wanted, rate: Rate) -> tuple[Any, dict[str, Any]]:
-        done = pictures.composite(wanted)
+    def __call__(
+        self, pictures: PreviewPictures, wanted: Wanted, done: Composited, rate: Rate
+    ) -> tuple[Any, dict[str, Any]]:
         self._target.resize(wanted.size)
         with self._target.drawing():
             statistics = self._screen.draw(wanted, done, lambda s: texts(wanted, s, rate), encode=False)

@@ -51,6 +51,7 @@ class PreviewScreen:
         self._overlays: dict[str, Overlay] = {}
         self._labels: dict[tuple[str, Colour], Texture] = {}
         self._uploaded: dict[str, psw.EyeImage] = {}
+        self._upload_ms = 0.0  # of this frame
 
     @property
     def has_quad_buffers(self) -> bool:
@@ -77,16 +78,20 @@ class PreviewScreen:
 
         Returns
         -------
-        The frame's figures. `warp_ms` is what this thread spent on it: a graphics card may go on by itself.
+        The frame's figures. `upload_ms` and `warp_ms` are what this thread spent on them: a graphics card may
+        go on by itself, until `finish`.
         """
         start = perf_counter()
         self._uploaded.clear()
+        self._upload_ms = 0.0
         if wanted.outside:
             target = self._draw_room(wanted, done)
             shown, mode = {"left": target, "middle": target, "right": target}, "mono"
         else:
             shown, mode = self._draw_eyes(done.inside.pictures, "window"), wanted.stereo.shown_mode
-        figures = {**done.statistics, "warp_ms": 1e3 * (perf_counter() - start), "warp": self.warp}
+        warp_ms = 1e3 * (perf_counter() - start) - self._upload_ms
+        times = {"upload_ms": self._upload_ms, "warp_ms": warp_ms, "warp": self.warp}
+        figures = {**done.statistics, **times}
         written = list(texts(figures))
         left, right = (shown[name] for name in wanted.stereo.channels)
         for target in {id(target): target for target in (left, right)}.values():
@@ -103,6 +108,10 @@ class PreviewScreen:
             encode=encode,
         )
         return figures
+
+    def finish(self) -> None:
+        """Wait until all is drawn."""
+        self._composer.finish()
 
     def choose_warp(self, wanted: Wanted, done: Composited) -> str:
         """The faster warp here, measured by drawing this frame; used from now on."""
@@ -154,15 +163,17 @@ class PreviewScreen:
             wall.make_mipmaps()
         room = self._target("room", wanted.size)
         with room.drawing():
-            painter = _RoomOnScreen(self, wanted, walls, done.outside.pictures[0] if done.outside else None)
+            painter = _RoomOnScreen(self, wanted, walls, done.outside)
             self.pictures.paint_room(painter, wanted, done)
         return room
 
     def _upload(self, picture: Picture) -> None:
         """An eye's image once a frame, for all the walls that show it."""
         if self._uploaded.get(picture.eye) is not picture.image:
+            start = perf_counter()
             self._texture.upload(picture.image, picture.eye)
             self._uploaded[picture.eye] = picture.image
+            self._upload_ms += 1e3 * (perf_counter() - start)
 
     def _target(self, name: str, size: Sequence[int]) -> EyeTarget:
         if name not in self._targets:
@@ -180,11 +191,11 @@ class PreviewScreen:
         """The volume as an eye sees it, over the whole bound framebuffer."""
         width, height = picture.view.size
         if self.warp == "texture":
-            self._texture.upload(picture.image, "visitor")
-            self._texture.draw_view(picture.view, "visitor")
+            self._upload(picture)
+            self._texture.draw_view(picture.view, picture.eye)
             return
-        drawn = self._target("visitor", (width, height))
-        drawn.upload(self.pictures.warp("visitor", picture.image, picture.view))
+        drawn = self._target(picture.eye, (width, height))
+        drawn.upload(self.pictures.warp(picture.eye, picture.image, picture.view))
         corners = [(0, height, 0), (width, height, 0), (width, 0, 0), (0, 0, 0)]
         self._shapes.picture(clip_from_pixels((width, height)), corners, drawn.texture, hidden=False)
 

@@ -23,6 +23,7 @@ from .keys import KEYS
 from .pictures import PreviewPictures
 
 SIZE = (960, 720)
+TARGETS_HZ = (1.0, 1000.0)
 UP = (0.0, 0.0, 1.0)  # of a volume's world, where a scene has none: towards a patient's head
 
 
@@ -39,6 +40,8 @@ def open_preview(
     rig_file: str | Path | None = None,
     recording: str | Path | None = None,
     presets: tuple[str, ...] = (),
+    target_hz: float = 0.0,
+    held: bool = False,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[Preview, PreviewPictures]:
     """A preview of a scene, and what makes its pictures.
@@ -53,6 +56,10 @@ def open_preview(
         A recorded head path, placed as the rig says.
     presets
         Names that the preset keys go through.
+    target_hz
+        The frame rate that quality follows, from that of the settings on; 0: none, it stays as set.
+    held
+        It stays as set until the user lets it go.
 
     Raises
     ------
@@ -62,6 +69,11 @@ def open_preview(
     size = size or SIZE
     if not all(16 <= n <= 16384 for n in size):
         raise PreviewError(f"a window is 16 … 16384 pixels wide and high; given {size[0]} × {size[1]}")
+    if target_hz and not TARGETS_HZ[0] <= target_hz <= TARGETS_HZ[1]:
+        low, high = TARGETS_HZ
+        raise PreviewError(
+            f"--target is {low:g} … {high:g} frames a second, or 0 for none; given {target_hz:g}"
+        )
     rig = four_walls() if rig_file is None else open_rig(rig_file)
     head_at = None if recording is None else recorded_head(rig, recording)
     volume, view = scene.volume, scene.view(0)
@@ -72,17 +84,6 @@ def open_preview(
     renderer = psw.Renderer(volume, scene.transfer, settings, scene.regions, relay)
     place = room_from_world(rig, volume)
     preset = scene.preset.name if scene.preset else None
-    corners = corners_in_room(np.eye(4), volume)  # in its own world
-    preview = Preview(
-        Camera.of_view(view),
-        up=scene.keys.up or UP,
-        extent=float(np.ptp(corners, axis=0).max()) or 1.0,
-        size=size,
-        rig=rig,
-        outside_home=room_camera(rig, size),
-        head_at=head_at,
-        choices=Choices(presets, preset, settings.quality, stereo),
-    )
 
     def transfer_of(name: str | None) -> psw.TransferFunction:
         return scene.transfer if name == preset else psw.Scene.of_volume(volume, tf=name).transfer
@@ -95,8 +96,21 @@ def open_preview(
         background=scene.background,
         near=view.eye.near,
         preset=preset,
+        target_hz=target_hz,
     )
     pictures.progress = progress or pictures.progress
+    follows = pictures.target_hz > 0
+    corners = corners_in_room(np.eye(4), volume)  # in its own world
+    preview = Preview(
+        Camera.of_view(view),
+        up=scene.keys.up or UP,
+        extent=float(np.ptp(corners, axis=0).max()) or 1.0,
+        size=size,
+        rig=rig,
+        outside_home=room_camera(rig, size),
+        head_at=head_at,
+        choices=Choices(presets, preset, settings.quality, stereo, follows=follows, held=held),
+    )
     return preview, pictures
 
 

@@ -29,7 +29,8 @@ class Wanted:
     head, head_eyes
         In the room; None without one.
     quality, preset
-        What the pictures should be like; preset None: the scene's own transfer function.
+        What the pictures should be like; quality None: what the frame rate allows, and at rest all that there
+        is; preset None: the scene's own transfer function.
     overlay, help
         Which texts lie over the picture.
     volume_outside
@@ -52,7 +53,7 @@ class Wanted:
     eyes: EyePair
     head: Pose | None
     head_eyes: EyePair | None
-    quality: float
+    quality: float | None
     preset: str | None
     overlay: bool
     help: bool
@@ -62,3 +63,10 @@ class Wanted:
     message: str
     moving: bool
     path_runs: bool | None
+
+    @property
+    def eye_images(self) -> tuple[object, ...]:
+        """What eye images depend on: two moments of which it is equal differ in texts alone."""
+        head = (*self.head.position.tolist(), *self.head.orientation.tolist()) if self.outside else ()
+        inside = (self.camera, self.size, self.stereo, self.separation, self.quality, self.preset)
+        return (*inside, self.outside, self.volume_outside and self.outside, *head)
