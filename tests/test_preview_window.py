@@ -17,13 +17,17 @@ from PIL import Image
 from samples import ROOT
 from virtual_screen import SECONDS, Program, display, environment  # noqa: F401  (a fixture)
 
+import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.room.painter import BACKGROUND
 
 pytestmark = pytest.mark.gl
 
 SIZE = (480, 360)
+REFINED_S = 2.0  # more than refining so small a volume takes
 TITLE = "body: persp-sw view"
+STAYS = ("--target", 0)
+DRAG = ("mousemove", 200, 180, "mousedown", 1, "mousemove", 260, 180, "mousemove", 320, 200, "mouseup", 1)
 
 
 @pytest.fixture
@@ -85,9 +89,10 @@ def preview(
     tmp_path: Path,
     request: pytest.FixtureRequest,
 ) -> Iterator[Preview]:
-    """Figures are off, for they change; quality stays; pictures go to tmp_path."""
-    more = getattr(request, "param", ())
-    options = ("--press", "O", "--target", 0, "--json", "-o", tmp_path, "--size", *SIZE, *more)
+    """Figures are off, for they change; quality stays, but where a test says else; files go to tmp_path."""
+    more = getattr(request, "param", STAYS)
+    options = ("--press", "O", "--trace", tmp_path / "trace.jsonl", "--json", "-o", tmp_path)
+    options += ("--size", *SIZE, *more)
     with Preview(display, volume_file, *options) as shown:
         number = shown.window(TITLE)
         shown.hand("windowmove", number, 0, 0)
@@ -106,16 +111,16 @@ def covered(picture: np.ndarray) -> float:
     return float((picture.max(-1) > 8).mean())
 
 
-@pytest.mark.parametrize("preview", [("--warp", "texture"), ("--warp", "software")], indirect=True)
+@pytest.mark.parametrize(
+    "preview", [(*STAYS, "--warp", "texture"), (*STAYS, "--warp", "software")], indirect=True
+)
 def test_hands_move_the_view_and_keys_change_it(preview: Preview, tmp_path: Path):
     home = preview.until(lambda p: covered(p) > 0.1)
     assert covered(home[:40, :40]) == 0  # no figures
     changed = lambda p: apart(p, home) > 1  # noqa: E731
 
     # An orbit, and back.
-    preview.hand(
-        "mousemove", 200, 180, "mousedown", 1, "mousemove", 260, 180, "mousemove", 320, 200, "mouseup", 1
-    )
+    preview.hand(*DRAG)
     turned = preview.until(changed)
     assert 0.5 * covered(home) < covered(turned) < 2 * covered(home)  # the same thing from another side
     preview.hand("key", "r")
@@ -180,6 +185,45 @@ def test_flight_and_the_room_from_outside(preview: Preview):
     preview.until(lambda p: apart(p, moved) > 0.05)
     preview.hand("key", "Escape")
     assert preview.leave()["compositings"] == 2  # the volume itself is off: two eyes
+
+
+@pytest.mark.parametrize("preview", [("--target", 1000)], indirect=True)
+def test_quality_follows_the_frame_rate_and_is_refined_at_rest(preview: Preview, tmp_path: Path):
+    home = preview.until(lambda p: covered(p) > 0.1)
+    preview.hand(*DRAG)
+    preview.until(lambda p: apart(p, home) > 1)
+    time.sleep(REFINED_S)
+    preview.hand("key", "Tab")
+    preview.until(lambda p: np.abs(p[2, 2] - BACKGROUND).max() <= 1)
+    time.sleep(REFINED_S)
+    preview.hand("key", "Tab")
+    time.sleep(REFINED_S)
+    preview.hand("key", "Escape")
+    assert preview.leave()["target_hz"] == 1000.0
+    trace = psw.read_trace(tmp_path / "trace.jsonl")
+    refined, quality = trace["refined"].astype(bool), trace["quality"]
+    # Four rests; each ends in full quality, which no moving picture at such a rate has.
+    ends = np.flatnonzero(refined & ~np.append(refined[1:], False))
+    assert len(ends) >= 4
+    assert (quality[ends[-3:]] == 2.0).all()
+    assert quality[~refined].min() < 1.0
+    assert ends[-1] == len(refined) - 1  # and nothing was drawn after it
+
+
+@pytest.mark.parametrize("preview", [("--quality", 0.5)], indirect=True)
+def test_a_quality_that_is_given_stays_until_it_is_let_go(preview: Preview, tmp_path: Path):
+    home = preview.until(lambda p: covered(p) > 0.1)
+    preview.hand(*DRAG)
+    turned = preview.until(lambda p: apart(p, home) > 1)
+    preview.hand("key", "0")
+    preview.until(lambda p: (p != turned).any())
+    preview.hand("key", "Escape")
+    assert preview.leave()["target_hz"] == 30.0
+    trace = psw.read_trace(tmp_path / "trace.jsonl")
+    held = trace["why"] == "held"
+    assert (trace["quality"][held] == 0.5).all()
+    assert held[:10].all()
+    assert not held[-1]
 
 
 def test_the_close_button_ends_the_program(preview: Preview):

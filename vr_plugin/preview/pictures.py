@@ -42,11 +42,14 @@ class Composited:
         Of the outside camera: the volume itself; None where it is not shown.
     statistics
         Of all of them together, as `figures.figures` needs them but for the warp.
+    besides_ms
+        What making them took besides planning and compositing.
     """
 
     inside: Frame
     outside: Picture | None
     statistics: Mapping[str, Any]
+    besides_ms: float = 0.0
 
 
 class PreviewPictures:
@@ -120,6 +123,7 @@ class PreviewPictures:
         Cancelled
             `cancel` was, meanwhile.
         """
+        start = perf_counter()
         steady = self._set_up(wanted)
         frame = steady.make(self._moment(wanted), cancel, resting)
         walls = [picture for picture in frame.pictures if picture.eye != _VISITOR]
@@ -127,11 +131,12 @@ class PreviewPictures:
         made = frame.made
         figures = {"quality": made.quality, "why": made.choice.why if made.choice else ""}
         figures |= {"target_hz": self.target_hz, **_together(frame)}
-        return Composited(replace(frame, pictures=walls), visitor, figures)
+        spent_ms = 1e3 * (perf_counter() - start) - made.cost.ms - made.cost.planning_ms
+        return Composited(replace(frame, pictures=walls), visitor, figures, max(spent_ms, 0.0))
 
     def drawn(self, wanted: Wanted, done: Composited, upload_ms: float = 0.0, warp_ms: float = 0.0) -> None:
         """What showing the eye images took, without the wait for the display: quality makes room for it."""
-        self._steady(wanted).drawn(done.inside, upload_ms, warp_ms)
+        self._steady(wanted).drawn(done.inside, upload_ms, warp_ms + done.besides_ms)
 
     def is_refined(self, wanted: Wanted) -> bool:
         """Whether eye images would be no better for more time than a frame has."""

@@ -1,0 +1,401 @@
+"""The preview keeps to its frame rate, refines at rest, and answers hands; costs are simulated, no clock."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from samples import fails, result_of
+
+import persp_sw as psw
+from persp_sw.volume.phantoms import synthetic_ct
+from vr_plugin.preview.choices import QUALITY_STEP
+from vr_plugin.preview.figures import Rate, figures, quality_line
+from vr_plugin.preview.in_window import PreviewLoop
+from vr_plugin.preview.recorder import Recorder, recorder_to
+from vr_plugin.preview.run import Screenshots
+from vr_plugin.preview.session import open_preview, press
+from vr_plugin.rig import QualityAim
+
+SIZE = (160, 120)
+LIMITS = QualityAim()
+# A second a frame: the milliseconds that planning really takes are nothing beside it.
+TARGET_HZ, TARGET_MS = 1.0, 1000.0
+WITHIN = 0.1  # of the target, which the controller's band is well inside of
+SAMPLES = 1e5  # of an eye image of quality 1; small real ones come in stairs of whole packets
+FALL = 0.75  # largest change of ln(quality) when motion ends refinement
+WAIT = 60.0
+
+
+@pytest.fixture(scope="module")
+def scene() -> psw.Scene:
+    return psw.Scene.of_volume(synthetic_ct(48), size=SIZE)
+
+
+class Machine:
+    """Takes the place of the screen and of the clock.
+
+    Attributes
+    ----------
+    frame_ms, drawing_s, swap_s
+        What compositing an eye image of quality 1, drawing, and waiting for the display take.
+    shown
+        What was drawn, frame by frame: (wanted, done).
+    """
+
+    def __init__(self, scene: psw.Scene, *, quality: float = 1.0, trace: Any = None, **options: Any):
+        settings = psw.Settings(quality=quality)
+        self.preview, self.pictures = open_preview(
+            scene, settings, size=SIZE, **{"target_hz": TARGET_HZ, **options}
+        )
+        self.frame_ms = self.drawing_s = self.swap_s = self.clock_s = 0.0
+        for steady in (self.pictures._inside, self.pictures._outside):
+            steady.maker.composite = self._with_its_time(steady.maker.composite)
+        self.shown: list[tuple[Any, Any]] = []
+        self.now = 0.0
+        window = SimpleNamespace(
+            name="body", is_drawn=True, first_row=0, make_current=lambda: None, set_title=lambda title: None
+        )
+        windows = SimpleNamespace(swap=lambda: self.pass_time(self.swap_s))
+        shots = Screenshots(self.preview, self.pictures, Path(), "body")
+        self.loop = PreviewLoop(self.preview, self.pictures, self, windows, window, shots, Recorder(trace))
+
+    def _with_its_time(self, composite: Callable[..., Any]) -> Callable[..., Any]:
+        def timed(*arguments: Any) -> Any:
+            frame = composite(*arguments)
+            part = self.pictures.renderer.settings.quality**2
+            spent = {"composite_ms": part * self.frame_ms, "samples": part * SAMPLES}
+            spent |= {"encode_ms": 0.0, "compile_ms": 0.0}
+            statistics = {eye: {**s, **spent} for eye, s in frame.statistics.items()}
+            return replace(frame, statistics=statistics)
+
+        return timed
+
+    def draw(self, wanted: Any, done: Any, texts: Any, first_row: int) -> dict[str, Any]:
+        """As a `PreviewScreen` does."""
+        self.shown.append((wanted, done))
+        self.pass_time(self.drawing_s)
+        return {**done.statistics, "upload_ms": 0.0, "warp_ms": 0.0, "warp": "none"}
+
+    def finish(self) -> None:
+        """As a `PreviewScreen` does."""
+
+    def pass_time(self, seconds: float) -> None:
+        """Of the clock."""
+        self.clock_s += seconds
+
+    def turn(self, count: int = 1, orbit: float = 0.0) -> None:
+        """So many turns of the loop, a refiner's picture waited for."""
+        for _ in range(count):
+            self.now += 0.02
+            if orbit:
+                self.preview.orbit(orbit)
+            self.loop.turn(self.preview.advance(self.now))
+            if self.loop._refiner is not None:
+                assert self.loop._refiner.wait(WAIT)
+
+    def press(self, keys: str) -> None:
+        """Keys, and what follows of them at once."""
+        press(self.preview, keys)
+        self.turn()
+
+    @property
+    def last(self) -> dict[str, Any]:
+        """Figures of the last frame."""
+        return self.shown[-1][1].statistics
+
+    def qualities(self, start: int = 0) -> list[float]:
+        """Of the frames shown from that one on."""
+        return [done.statistics["quality"] for _, done in self.shown[start:]]
+
+    def close(self) -> None:
+        self.loop._give_up_refining()
+
+
+@pytest.fixture
+def machine(scene: psw.Scene, monkeypatch: pytest.MonkeyPatch):
+    made: list[Machine] = []
+
+    def make(**options: Any) -> Machine:
+        made.append(Machine(scene, **options))
+        for module in ("in_window", "pictures"):
+            monkeypatch.setattr(f"vr_plugin.preview.{module}.perf_counter", lambda: made[-1].clock_s)
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.close()
+
+
+# --- in motion ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("keys", "eyes"), [("", 1), ("8", 2), ("TAB V", 1), ("TAB", 2), ("TAB 8", 3)])
+def test_quality_falls_and_rises_until_frames_take_the_target(
+    machine: Callable[..., Machine], keys: str, eyes: int
+):
+    """Mono and stereo, from inside and from outside, where the visitor's eye counts, too."""
+    m = machine()
+    press(m.preview, keys)
+    for load in (3.0, 0.6):
+        m.frame_ms = load * TARGET_MS / eyes
+        m.turn(25, orbit=0.005)
+        assert m.last["composite_ms"] == pytest.approx(TARGET_MS, rel=WITHIN)
+        assert m.last["quality"] == pytest.approx(load**-0.5, rel=WITHIN)
+    steps = np.abs(np.diff(np.log(m.qualities())))
+    assert steps.max() <= 0.25 + 1e-9
+
+
+def test_quality_makes_room_for_drawing_and_not_for_the_wait_for_the_display(
+    machine: Callable[..., Machine],
+):
+    m = machine()
+    m.frame_ms = 2.0 * TARGET_MS
+    m.drawing_s, m.swap_s = 0.5e-3 * TARGET_MS, 7e-3 * TARGET_MS
+    m.turn(60, orbit=0.005)
+    assert m.last["composite_ms"] == pytest.approx(0.5 * TARGET_MS, rel=WITHIN)
+
+
+def test_quality_stays_within_the_rig_s_limits(machine: Callable[..., Machine]):
+    m = machine()
+    m.frame_ms = 100.0 * TARGET_MS
+    m.turn(20, orbit=0.005)
+    assert m.last["quality"] == LIMITS.min_quality
+    m.frame_ms = 0.01 * TARGET_MS
+    m.turn(30, orbit=0.005)
+    assert m.last["quality"] == LIMITS.max_quality
+
+
+# --- at rest -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("keys", ["", "TAB"])
+def test_at_rest_it_refines_to_full_quality_and_then_does_nothing(machine: Callable[..., Machine], keys: str):
+    m = machine(quality=0.5)
+    press(m.preview, keys)
+    m.frame_ms = 4.0 * TARGET_MS
+    m.turn(12, orbit=0.005)
+    moving = len(m.shown)
+    assert m.last["quality"] < 0.75
+    m.turn(30)
+    climb = m.qualities(moving - 1)
+    assert climb[-1] == LIMITS.max_quality
+    assert m.last["why"] == "refined"
+    assert all(a < b for a, b in pairwise(climb))
+    assert np.diff(np.log(climb)).max() <= 0.25 + 1e-9
+    shown, at_rest = len(m.shown), m.pictures.renderer.last
+    m.turn(10)
+    assert len(m.shown) == shown
+    assert m.pictures.renderer.last is at_rest  # nothing was composited
+    assert m.loop.wait_s > 0.1
+    assert m.loop._refiner is None
+
+
+def test_motion_brings_quality_back_in_bounded_steps(machine: Callable[..., Machine]):
+    m = machine()
+    m.frame_ms = 4.0 * TARGET_MS
+    m.turn(20, orbit=0.005)
+    m.turn(30)
+    assert m.last["quality"] == LIMITS.max_quality
+    rest = len(m.shown)
+    m.turn(20, orbit=0.005)
+    falls = -np.diff(np.log(m.qualities(rest - 1)))
+    assert falls.max() <= FALL + 1e-9
+    assert m.qualities()[rest] < LIMITS.max_quality
+    assert m.last["composite_ms"] == pytest.approx(TARGET_MS, rel=WITHIN)
+
+
+def test_texts_over_a_refined_picture_leave_it_as_it_is(machine: Callable[..., Machine]):
+    m = machine()
+    m.turn(30)
+    refined, composited = m.shown[-1], m.pictures.renderer.last
+    for number, change in enumerate((lambda: press(m.preview, "O"), lambda: m.preview.say("a word")), 1):
+        shown = len(m.shown)
+        change()
+        m.turn()
+        assert len(m.shown) == shown + 1, number
+        assert m.shown[-1][1] is refined[1]
+    while m.preview.choices.message:
+        m.turn()
+    assert m.shown[-1][0].message == ""  # drawn without it
+    assert m.shown[-1][1] is refined[1]
+    assert m.pictures.renderer.last is composited
+
+
+def test_a_hand_is_answered_while_a_picture_is_refined(machine: Callable[..., Machine]):
+    m = machine()
+    m.frame_ms = 4.0 * TARGET_MS
+    m.turn(10, orbit=0.005)
+    begun, cancels = threading.Event(), []
+    make = m.pictures._inside.make
+
+    def endless(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
+        if resting:
+            cancels.append(cancel)
+            begun.set()
+            while not cancel.is_cancelled:
+                time.sleep(1e-3)
+            cancel.check()
+        return make(moment, cancel, resting)
+
+    m.pictures._inside.make = endless
+    shown = len(m.shown)
+    m.loop.turn(m.preview.advance(m.now))
+    assert begun.wait(WAIT)
+    m.preview.say("while it is refined")
+    m.now += 0.02
+    m.loop.turn(m.preview.advance(m.now))  # is shown, and refinement goes on
+    assert len(m.shown) == shown + 1
+    assert not cancels[0].is_cancelled
+    m.preview.orbit(0.1)
+    m.now += 0.02
+    m.loop.turn(m.preview.advance(m.now))
+    assert cancels[0].is_cancelled
+    assert len(m.shown) == shown + 2
+    assert m.last["why"] not in ("refined", "")
+    np.testing.assert_array_equal(m.shown[-1][0].camera.position, m.shown[-1][1].inside.head.position)
+
+
+def test_what_refining_raises_reaches_the_user(machine: Callable[..., Machine]):
+    m = machine()
+    m.turn(3)
+    make, faults = m.pictures._inside.make, [psw.PerspSWError("no room for it"), RuntimeError("a fault")]
+
+    def failing(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
+        if resting and faults:
+            raise faults.pop(0)
+        return make(moment, cancel, resting)
+
+    m.pictures._inside.make = failing
+    m.turn(2)
+    assert m.preview.choices.message == "no room for it"
+    with pytest.raises(RuntimeError, match="a fault"):
+        m.turn(3)
+
+
+# --- by hand -----------------------------------------------------------------------------------------------
+
+
+def test_keys_hold_quality_from_where_it_is_and_let_it_go(machine: Callable[..., Machine]):
+    m = machine()
+    m.frame_ms = 4.0 * TARGET_MS
+    m.turn(20, orbit=0.005)
+    free = m.last["quality"]
+    m.press("+")
+    assert m.last["quality"] == pytest.approx(free * QUALITY_STEP)
+    assert m.last["why"] == "held"
+    m.press("- -")
+    assert m.last["quality"] == pytest.approx(free / QUALITY_STEP)
+    m.turn(20, orbit=0.005)
+    m.turn(20)
+    assert m.last["quality"] == pytest.approx(free / QUALITY_STEP)  # at rest, too
+    m.press("0")
+    m.turn(20, orbit=0.005)
+    assert m.last["composite_ms"] == pytest.approx(TARGET_MS, rel=WITHIN)
+    m.turn(30)
+    assert m.last["quality"] == LIMITS.max_quality
+
+
+def test_without_a_target_quality_stays_and_0_brings_it_back(machine: Callable[..., Machine]):
+    m = machine(quality=0.7, target_hz=0.0)
+    m.frame_ms = 9.0 * TARGET_MS
+    m.turn(10, orbit=0.005)
+    m.turn(10)
+    assert set(m.qualities()) == {0.7}
+    m.press("+")
+    assert m.last["quality"] == pytest.approx(0.7 * QUALITY_STEP)
+    m.press("0")
+    assert m.last["quality"] == 0.7
+
+
+def test_a_quality_of_the_user_s_own_is_held_until_it_is_let_go(machine: Callable[..., Machine]):
+    m = machine(quality=0.7, held=True)
+    m.frame_ms = 9.0 * TARGET_MS
+    m.turn(10, orbit=0.005)
+    m.turn(10)
+    assert set(m.qualities()) == {0.7}
+    assert m.last["why"] == "held"
+    m.press("0")
+    m.turn(10, orbit=0.005)
+    assert m.last["quality"] < 0.6
+
+
+# --- what is said ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("quality", "why", "target_hz", "words"),
+    [
+        (0.712, "steady", 30.0, "0.71, follows 30 Hz"),
+        (1.0, "first", 30.0, "1.0, follows 30 Hz"),
+        (1.3, "falling", 60.0, "1.3, follows 60 Hz"),
+        (1.0, "held", 30.0, "1.0, held"),
+        (2.0, "refined", 30.0, "2.0, refined at rest"),
+        (0.5, "", 0.0, "0.50"),
+    ],
+)
+def test_the_overlay_says_why_quality_is_what_it_is(quality: float, why: str, target_hz: float, words: str):
+    assert quality_line({"quality": quality, "why": why, "target_hz": target_hz}) == words
+
+
+def test_the_figures_of_real_frames_say_it(machine: Callable[..., Machine]):
+    m = machine()
+    m.turn(1)
+    said = lambda: figures(m.shown[-1][0], {**m.last, "warp_ms": 0.0, "warp": "none"}, Rate())  # noqa: E731
+    assert "quality    1.0, follows 1 Hz" in said()
+    m.turn(30)
+    assert "quality    2.0, refined at rest" in said()
+    m.press("-")
+    assert "quality    1.4, held" in said()
+
+
+def test_a_trace_has_every_frame(machine: Callable[..., Machine], tmp_path: Path):
+    path = tmp_path / "t.jsonl.gz"
+    with recorder_to(path, "body", psw.Settings(), TARGET_HZ, LIMITS) as recorder:
+        m = machine()
+        m.loop._recorder = recorder
+        m.frame_ms = 2.0 * TARGET_MS
+        m.turn(5, orbit=0.01)
+        m.turn(30)
+        m.press("O")
+    trace = psw.read_trace(path)
+    assert len(trace["frame"]) == len(m.shown)
+    np.testing.assert_allclose(trace["quality"], m.qualities(), atol=1e-6)
+    assert trace["refined"][:5].sum() == 0
+    assert trace["refined"][5:-1].all()
+    assert trace["compositings"][-1] == 0  # texts alone
+    assert (trace["target_ms"] == TARGET_MS).all()
+    place = np.array([wanted.camera.position for wanted, _ in m.shown])
+    np.testing.assert_allclose(np.array(trace["head"].tolist())[:, :3], place, atol=1e-5)
+
+
+# --- the command, without a screen -------------------------------------------------------------------------
+
+
+def test_the_command_follows_a_target_without_a_screen_only_if_asked(ball_file: Path, tmp_path: Path):
+    common = ("view", ball_file, "--offscreen", "--frames", 4, "--turn", 5, "--size", *SIZE, "-o", tmp_path)
+    values = result_of(*common)
+    assert (values["quality"], values["why"], values["target_hz"]) == (1.0, "", 0.0)
+    assert result_of(*common, "--quality", 0.7)["quality"] == 0.7
+    trace = tmp_path / "trace.jsonl"
+    values = result_of(*common, "--target", 1, "--quality", 0.7, "--trace", trace)
+    assert values["target_hz"] == 1.0
+    assert values["quality"] > 0.7  # a second is more than enough
+    recorded = psw.read_trace(trace)
+    assert len(recorded["frame"]) == 4
+    assert recorded["quality"][0] == pytest.approx(0.7)
+    assert recorded["quality"][-1] == pytest.approx(values["quality"], abs=1e-6)
+
+
+@pytest.mark.parametrize("target", [-1, 0.5, 2000, "nan"])
+def test_a_rate_that_is_none_is_refused(ball_file: Path, tmp_path: Path, target: object):
+    words = fails("view", ball_file, "--offscreen", "--target", target, "-o", tmp_path)
+    assert "--target is 1 … 1000" in words
