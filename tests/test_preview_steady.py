@@ -264,6 +264,48 @@ def test_a_hand_is_answered_while_a_picture_is_refined(machine: Callable[..., Ma
     np.testing.assert_array_equal(m.shown[-1][0].camera.position, m.shown[-1][1].inside.head.position)
 
 
+def test_the_last_and_best_picture_is_waited_for(machine: Callable[..., Machine]):
+    m = machine()
+    m.turn(3)
+    go_on, make = threading.Event(), m.pictures._inside.make
+
+    def slow(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
+        frame = make(moment, cancel, resting)
+        assert not resting or frame.made.quality < LIMITS.max_quality or go_on.wait(WAIT)
+        return frame
+
+    m.pictures._inside.make = slow
+    while not m.pictures.is_refined(m.shown[-1][0]):
+        m.now += 0.02
+        m.loop.turn(m.preview.advance(m.now))
+    for _ in range(10):
+        m.now += 0.02
+        m.loop.turn(m.preview.advance(m.now))
+    assert m.last["quality"] < LIMITS.max_quality
+    go_on.set()
+    m.turn(2)
+    assert m.last["quality"] == LIMITS.max_quality
+
+
+def test_a_head_that_moves_outside_is_seen_and_one_that_halts_lets_the_room_rest(
+    machine: Callable[..., Machine], tmp_path: Path
+):
+    path = tmp_path / "head.csv"
+    rows = [f"{n / 60},{0.1 * n},1.7,1,0,0,0,1" for n in range(600)]
+    path.write_text("\n".join(["t,x,y,z,qx,qy,qz,qw", *rows]))
+    m = machine(recording=path)
+    press(m.preview, "TAB")
+    m.turn(5)
+    seen = [done.inside.head.position[0] for _, done in m.shown]
+    assert np.diff(seen).min() > 0
+    m.press("SPACE")
+    m.turn(30)
+    assert m.last["why"] == "refined"
+    shown = len(m.shown)
+    m.turn(5)
+    assert len(m.shown) == shown
+
+
 def test_what_refining_raises_reaches_the_user(machine: Callable[..., Machine]):
     m = machine()
     m.turn(3)
@@ -295,8 +337,10 @@ def test_keys_hold_quality_from_where_it_is_and_let_it_go(machine: Callable[...,
     m.press("- -")
     assert m.last["quality"] == pytest.approx(free / QUALITY_STEP)
     m.turn(20, orbit=0.005)
+    shown = len(m.shown)
     m.turn(20)
     assert m.last["quality"] == pytest.approx(free / QUALITY_STEP)  # at rest, too
+    assert len(m.shown) == shown
     m.press("0")
     m.turn(20, orbit=0.005)
     assert m.last["composite_ms"] == pytest.approx(TARGET_MS, rel=WITHIN)
