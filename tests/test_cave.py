@@ -111,6 +111,42 @@ def test_an_eye_outside_the_walls_is_counted(files):
     assert said["outside_frames"] == 3  # at 0.8, 0.9 and 1 s
 
 
+def test_quality_is_the_rig_s_unless_it_is_given(files):
+    (files / "rig.toml").write_text(RIG + "\n[quality]\nquality = 0.6\n")
+    assert run(files, "--frames", "1")["quality"] == 0.6
+    assert run(files, "--frames", "1", "--quality", "1")["quality"] == 1.0
+
+
+def test_quality_follows_the_rate_and_a_trace_tells_how(files):
+    limits = "\n[quality]\nquality = 1.0\nmin = 0.5\nmax = 1.5\n"
+    (files / "rig.toml").write_text(RIG + limits)
+    trace = files / "trace.jsonl"
+    options = ["--path", str(files / "path.csv"), "--frames", "30", "--trace", str(trace)]
+    # At 1000 Hz not even the warp is done in time, at 1 Hz everything is.
+    for rate, least, most in (("1000", 0.5, 1.0), ("1", 1.0, 1.5)):
+        said = run(files, *options, "--adapt", "--rate", rate)
+        header, *frames = map(json.loads, trace.read_text().splitlines())
+        assert (header["min_quality"], header["max_quality"]) == (0.5, 1.5)
+        assert header["target_hz"] == float(rate) and header["scene"].endswith("scene.json")
+        qualities = [frame["quality"] for frame in frames]
+        assert len(frames) == 30 and said["quality"] == pytest.approx(qualities[-1], abs=1e-6)
+        assert min(qualities) == pytest.approx(least) and max(qualities) == pytest.approx(most)
+        assert np.abs(np.diff(np.log(qualities))).max() <= 0.25 + 1e-5
+        assert all(frame["composite_ms"] > 0 and frame["warp_ms"] > 0 for frame in frames)
+    steady = run(files, *options, "--rate", "1000")
+    assert steady["quality"] == 1.0
+    assert {json.loads(line)["quality"] for line in trace.read_text().splitlines()[1:]} == {1.0}
+
+
+def test_a_trace_that_cannot_be_written_is_said_before_anything_is_drawn(files):
+    scene, rig = str(files / "scene.json"), str(files / "rig.toml")
+    (files / "taken").write_text("")
+    options = ["--offscreen", "--trace", str(files / "taken" / "run.jsonl"), "-o", str(files / "out")]
+    result = CliRunner().invoke(cave, [rig, scene, *options])
+    assert isinstance(result.exception, psw.PerspSWError) and "run.jsonl" in str(result.exception)
+    assert not list((files / "out").glob("*.png"))
+
+
 @pytest.mark.gl
 def test_both_warps_show_the_same(files):
     values = {}

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from persp_sw.commands.options import (
     json_option,
@@ -133,6 +134,8 @@ def cave(
     folder = psw.images.output_folder(out) if offscreen else Path(out)
     with progress_bars() as progress:
         shown = open_scene(scene, progress, **keys)
+        if click.get_current_context().get_parameter_source("quality") is not ParameterSource.COMMANDLINE:
+            quality = chosen.quality.quality
         settings = settings_for(shown, quality, samples, residual, threads)
         if not (offscreen or in_turn):  # else each image is shown to the eye it was made for
             settings = replace(settings, depth_slabs=slabs)
@@ -242,6 +245,7 @@ def _offscreen(
         "walls": [wall.name for wall in rig.walls],
         **costs.report(),
         **{key: last.get(key) for key in ("threads", "faces", "intermediate_size", "runs_bytes")},
+        "quality": frame.made.quality,
         "rate_hz": rate_hz,
         "head": frame.head.position.tolist(),
         "outside_frames": loop.outside.frames if loop.outside else 0,
