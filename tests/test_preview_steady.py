@@ -126,8 +126,8 @@ def machine(scene: psw.Scene, monkeypatch: pytest.MonkeyPatch):
 
     def make(**options: Any) -> Machine:
         made.append(Machine(scene, **options))
-        for module in ("in_window", "pictures"):
-            monkeypatch.setattr(f"vr_plugin.preview.{module}.perf_counter", lambda: made[-1].clock_s)
+        for clock in ("in_window.monotonic", "pictures.perf_counter"):
+            monkeypatch.setattr(f"vr_plugin.preview.{clock}", lambda: made[-1].clock_s)
         return made[-1]
 
     yield make

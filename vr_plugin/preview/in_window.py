@@ -11,7 +11,7 @@ import logging
 import threading
 from collections.abc import Iterable
 from pathlib import Path
-from time import perf_counter
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import persp_sw as psw
@@ -159,7 +159,7 @@ class PreviewLoop:
                 feed(self.preview, self.windows.poll(self.wait_s))
                 if self.rows and turn:
                     self.preview.orbit(turn)
-                self.turn(self.preview.advance(perf_counter()), always=frames is not None)
+                self.turn(self.preview.advance(monotonic()), always=frames is not None)
         finally:
             self._give_up_refining()
         return Run(self.rows, self._shots.written)
@@ -199,10 +199,10 @@ class PreviewLoop:
 
     def _composite(self, wanted: Wanted) -> None:
         self._give_up_refining()
-        begin = perf_counter()
+        begin = monotonic()
         done = self.pictures.composite(wanted)
         figures = self._show(wanted, done, begin=begin)
-        seconds = perf_counter() - begin
+        seconds = monotonic() - begin
         self._rate.add(seconds)
         self.rows.append({"ms": 1e3 * seconds, **figures})
 
@@ -242,15 +242,15 @@ class PreviewLoop:
         if self.choose_warp:
             self.screen.choose_warp(wanted, done)
             self.choose_warp = False
-        start = perf_counter()
+        start = monotonic()
         figures = self.screen.draw(
             wanted, done, lambda s: texts(wanted, s, self._rate), first_row=self.window.first_row
         )
         if self._timed:
             self.screen.finish()
-        drawn = perf_counter()
+        drawn = monotonic()
         self.windows.swap()
-        end = perf_counter()
+        end = monotonic()
         upload_ms = figures["upload_ms"]
         warp_ms = 1e3 * (drawn - start) - upload_ms  # texts and all
         begin = begin or start
