@@ -154,6 +154,7 @@ class FrameMaker:
     def room_from_world(self, matrix: np.ndarray) -> None:
         self._room_from_world = np.array(matrix, np.float64)
         self._world_from_room = np.linalg.inv(self._room_from_world)
+        self._room_walls: dict[tuple[RigWall, float], psw.Wall] = {}  # they move with the volume only
         self._metres = float(np.cbrt(abs(np.linalg.det(self._room_from_world[:3, :3]))))  # a world unit
 
     def make(self, head: Pose, eyes: EyePair, near: float = 0.0, modes: Mapping[str, str] = _NONE) -> Frame:
@@ -183,8 +184,7 @@ class FrameMaker:
             What else the moment knows: its regions, its stamp.
         """
         shown = {wall.name: eyes_of(modes.get(wall.name, wall.stereo)) for wall in self.walls}
-        wide = [(wall, wall.widened(margins.get(wall.fixed_to, 0.0))) for wall in self.walls]
-        walls = [(wall, self._in_world(widened.in_room(head))) for wall, widened in wide]
+        walls = [(wall, self._in_world(wall, margins.get(wall.fixed_to, 0.0), head)) for wall in self.walls]
         sights, edge_on = {}, []
         for name in dict.fromkeys(name for names in shown.values() for name in names):
             eye = psw.Eye(self._point(getattr(eyes, name)), near / self._metres)
@@ -230,9 +230,16 @@ class FrameMaker:
         self._previous.update(images)
         return Frame(moment, pictures_of(moment, images), images, statistics)
 
-    def _in_world(self, wall: psw.Wall) -> psw.Wall:
-        corners = (self._point(c) for c in (wall.lower_left, wall.lower_right, wall.upper_left))
-        return psw.Wall(*corners, pixels=wall.pixels, name=wall.name)
+    def _in_world(self, wall: RigWall, margin: float, head: Pose) -> psw.Wall:
+        key = wall, margin
+        if wall.fixed_to == "room" and key in self._room_walls:
+            return self._room_walls[key]
+        at = wall.widened(margin).in_room(head)
+        corners = (self._point(c) for c in (at.lower_left, at.lower_right, at.upper_left))
+        in_world = psw.Wall(*corners, pixels=at.pixels, name=at.name)
+        if wall.fixed_to == "room":
+            self._room_walls[key] = in_world
+        return in_world
 
     def _point(self, point: np.ndarray) -> np.ndarray:
         return self._world_from_room[:3, :3] @ point + self._world_from_room[:3, 3]

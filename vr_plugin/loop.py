@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from time import monotonic
 from types import MappingProxyType
 
 import numpy as np
@@ -82,10 +83,11 @@ class Loop:
 
         One head pose is taken, once: no frame mixes two.
         """
+        begun_s = monotonic()
         self.poll(now)
         moment = self.moment(now if shown_at is None else shown_at)
         self.look(moment)
-        return self.steady.make(moment)
+        return self.steady.make(moment, begun_s=begun_s)
 
     def poll(self, now: float) -> None:
         """Take what the tracker and the wand say; once a frame of the display."""

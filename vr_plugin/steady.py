@@ -58,27 +58,36 @@ class Steady:
         """Whether a resting viewer's pictures would not become better than the last."""
         return self.refinement is None or self.held is not None or self.refinement.is_full
 
-    def make(self, moment: Moment, cancel: psw.Cancel | None = None, resting: bool = False) -> Frame:
+    def make(
+        self,
+        moment: Moment,
+        cancel: psw.Cancel | None = None,
+        resting: bool = False,
+        begun_s: float | None = None,
+    ) -> Frame:
         """The frame of a moment.
 
         Parameters
         ----------
         resting
             Nothing moves: take more time than a frame has, step by step up to full quality.
+        begun_s
+            When the work on this frame began, `time.monotonic`: all of it that is no compositing counts as
+            planning. None: now.
 
         Raises
         ------
         Cancelled
             `cancel` was, meanwhile; the next frame goes on as if this one had not been asked for.
         """
-        renderer, begun_s = self.maker.renderer, monotonic()
+        renderer = self.maker.renderer
+        begun_s = monotonic() if begun_s is None else begun_s
         if moment.regions is not None and moment.regions is not renderer.regions:
             renderer.regions = moment.regions
         if self.controller is None:
             quality = self.held or self.base.quality
             renderer.settings = replace(self.base, quality=quality)
-            frame = self.maker.composite(moment, cancel)
-            return replace(frame, made=Made(quality, None, frame.cost(), begun_s))
+            return self._made(self.maker.composite(moment, cancel), quality, None, begun_s)
         plans = self.maker.plan(moment)
         features = renderer.features_of_plans(plans.values())
         measured, of = self._finished.pop() if self._finished else (None, None)
@@ -86,9 +95,13 @@ class Steady:
         if self.refinement is not None:
             choice = self.refinement.next(choice, resting)
         renderer.settings = choice.apply(self.base)
-        planning_ms = 1e3 * (monotonic() - begun_s)
-        frame = self.maker.composite(moment, cancel, plans)
-        return replace(frame, made=Made(choice.quality, choice, frame.cost(planning_ms), begun_s))
+        return self._made(self.maker.composite(moment, cancel, plans), choice.quality, choice, begun_s)
+
+    def _made(self, frame: Frame, quality: float, choice: psw.Choice | None, begun_s: float) -> Frame:
+        names = ("composite_ms", "encode_ms", "compile_ms")
+        known_ms = sum(statistics[name] for statistics in frame.statistics.values() for name in names)
+        planning_ms = max(1e3 * (monotonic() - begun_s) - known_ms, 0.0)
+        return replace(frame, made=Made(quality, choice, frame.cost(planning_ms), begun_s))
 
     def drawn(self, frame: Frame, upload_ms: float = 0.0, warp_ms: float = 0.0, swap_ms: float = 0.0) -> None:
         """What a frame took besides; the times that the same core cannot composite in."""

@@ -7,8 +7,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..eyes import before_wall
-
 _log = logging.getLogger("persp_sw")
 
 # Walls whose box is at least this deep, beside its longest edge, enclose a room; flatter, they are a screen.
@@ -27,13 +25,24 @@ def is_outside(eye: np.ndarray, corners: np.ndarray) -> bool:
 
     A single screen, flat or slightly bent, has no box to be in: only what is behind it is outside.
     """
-    eye = np.asarray(eye, np.float64)
-    if not all(before_wall(eye, wall) for wall in corners):
-        return True
-    low, high = corners.reshape(-1, 3).min(0), corners.reshape(-1, 3).max(0)
-    if (high - low).min() < ROOM_DEPTH * (high - low).max():
-        return False
-    return bool((eye < low).any() or (eye > high).any())
+    return _Inside(np.asarray(corners, np.float64)).is_outside(np.asarray(eye, np.float64))
+
+
+class _Inside:
+    """Half-spaces before all walls, and the box of a room, found once."""
+
+    def __init__(self, corners: np.ndarray):
+        lower_left, lower_right, upper_left = corners[:, 0], corners[:, 1], corners[:, 3]
+        self.normals = np.cross(lower_right - lower_left, upper_left - lower_left)
+        self.offsets = (self.normals * lower_left).sum(1)
+        self.low, self.high = corners.reshape(-1, 3).min(0), corners.reshape(-1, 3).max(0)
+        size = self.high - self.low
+        self.is_room = size.min() >= ROOM_DEPTH * size.max()
+
+    def is_outside(self, eye: np.ndarray) -> bool:
+        if (self.normals @ eye <= self.offsets).any():
+            return True
+        return bool(self.is_room and ((eye < self.low) | (eye > self.high)).any())
 
 
 class OutsideWatch:
@@ -47,13 +56,14 @@ class OutsideWatch:
 
     def __init__(self, corners: np.ndarray):
         self.corners = np.asarray(corners, np.float64)
+        self._inside = _Inside(self.corners)
         self.frames = 0
         self._outside = False
 
     def look(self, eyes: Iterable[np.ndarray]) -> bool:
         """Whether an eye of this frame is outside; counted, and said where none was in the frame before."""
         eyes = list(eyes)
-        outside = [eye for eye in eyes if is_outside(eye, self.corners)]
+        outside = [eye for eye in eyes if self._inside.is_outside(np.asarray(eye))]
         self.frames += bool(outside)
         if outside and not self._outside:
             _log.warning(
