@@ -29,7 +29,7 @@ class Settings:
     single_face_tangent
         One face of the eye image serves while no ray is steeper against it than this tangent, 1 … 8.
     level_of_detail
-        Take coarser voxels where pixels are more than two voxels apart, which would alias and cost more.
+        Take coarser voxels where pixels are more than some 2.4 voxels apart, which would alias and cost more.
     skip_empty
         Leave out what the transfer function makes invisible. Changes no pixel of a face, but faces are as
         large as the whole volume asks for without; off only for measuring.

@@ -59,11 +59,13 @@ def shares_at(zones, distance, levels):
 
 
 def wanted_shares(apart, levels):
-    """From what is said: a level begins where pixels are two of the finer one's voxels apart, rules at 4."""
-    level = np.clip(np.floor(np.log2(apart / 2)), 0, levels - 1).astype(int)
-    coarser = np.clip(apart / 2**level / 2 - 1, 0, 1) if level < levels - 1 else 0.0
+    """From what is said: a level begins where pixels are 2.4 of the finer's voxels apart, rules at 3.4."""
     shares = np.zeros(levels + 1)
-    shares[level : level + 2] = 1 - coarser, coarser
+    shares[0] = 1.0
+    for level in range(levels - 1):
+        coarser = np.clip((apart / 2**level - 2**1.25) / (2**1.75 - 2**1.25), 0, 1)
+        shares[level + 1] = shares[level] * coarser
+        shares[level] -= shares[level + 1]
     return shares
 
 
@@ -82,19 +84,19 @@ def test_every_distance_has_the_shares_that_its_pixels_ask_for(pitch, farthest, 
 def test_shares_are_continuous_where_zones_meet():
     levels = 6
     zones = list(detail_zones(0.1, 0.0, 1e4, levels))
-    assert [zone.fine for zone in zones] == [0, 0, 1, 2, 3, 4, 5]
+    assert [zone.fine for zone in zones] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 5]
     for zone in zones[1:]:
         before, after = (shares_at(zones, zone.near * s, levels) for s in (1 - 1e-9, 1 + 1e-9))
         np.testing.assert_allclose(before, after, atol=1e-7)
 
 
 def test_no_zone_begins_behind_the_volume_and_one_level_needs_none():
-    assert len(list(detail_zones(0.1, 0.0, 19.9, 5))) == 1
-    assert len(list(detail_zones(0.1, 0.0, 20.1, 5))) == 2
+    assert len(list(detail_zones(0.1, 0.0, 23.7, 5))) == 1
+    assert len(list(detail_zones(0.1, 0.0, 23.9, 5))) == 2
     assert [zone.far for zone in detail_zones(0.1, 0.0, 1e4, 1)] == [np.inf]
 
 
-@pytest.mark.parametrize("apart", [0.3, 2.0, 3.0, 4.0, 7.9, 8.1, 1e3])
+@pytest.mark.parametrize("apart", [0.3, 2.0, 2.9, 3.5, 4.0, 5.0, 7.9, 8.1, 1e3])
 @pytest.mark.parametrize("levels", [1, 2, 4])
 def test_parallel_rays_have_one_zone(apart, levels):
     (zone,) = detail_zones(0.0, apart, 50.0, levels)

@@ -1,9 +1,11 @@
 """Which levels of detail serve which distances of a face.
 
-Where neighbouring pixels are two voxels apart, the next coarser level begins to take over, and at four, two
-of its own voxels, it has. (Beginning at one voxel costs 3 to 6 dB.) Between them both levels are composited,
-each with its share of the extinction, so that nothing pops: the share changes with the distance only, and
-linearly.
+Where neighbouring pixels are 2.4 voxels apart, the next coarser level begins to take over, and at 3.4 it has;
+at 4.8 the next begins. Where one takes over both are composited, each with its share of the extinction, so
+that nothing pops: the share changes with the distance only, and linearly. That costs 1.5 times the finer
+level, which is why it is short: from 2 to 4 voxels, so that two levels were composited everywhere beyond 2,
+it took 1 to 2.4 times the samples at qualities up to 0.6, for pictures within 0.5 dB, and a lower quality was
+often slower than a higher one. (Beginning at one voxel costs 3 to 6 dB.)
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_BEGIN, _END = 2.0, 4.0  # voxels a pixel
+_BEGIN, _END = 2**1.25, 2**1.75  # voxels a pixel
 
 
 @dataclass(frozen=True)
@@ -46,23 +48,27 @@ def detail_zones(tangent_pitch: float, offset_pitch: float, farthest: float, lev
     if tangent_pitch == 0:
         yield _parallel_zone(offset_pitch, levels)
         return
-    near, far = 0.0, _BEGIN / tangent_pitch
-    if far >= farthest or levels == 1:
-        yield Zone(0, (0.0, 0.0), 0.0, np.inf)
-        return
-    yield Zone(0, (0.0, 0.0), 0.0, far)
+    alone, far = 0.0, _BEGIN / tangent_pitch
     for fine in range(levels - 1):
-        near, far = (limit * 2.0**fine / tangent_pitch for limit in (_BEGIN, _END))
-        slope = 1 / (far - near)
-        last = far >= farthest
-        yield Zone(fine, (-near * slope, slope), near, np.inf if last else far)
+        if far >= farthest:
+            break
+        yield Zone(fine, (0.0, 0.0), alone, far)
+        near, alone = far, _END * 2.0**fine / tangent_pitch
+        slope = 1 / (alone - near)
+        last = alone >= farthest
+        yield Zone(fine, (-near * slope, slope), near, np.inf if last else alone)
         if last:
             return
-    yield Zone(levels - 1, (0.0, 0.0), far, np.inf)
+        far = _BEGIN * 2.0 ** (fine + 1) / tangent_pitch
+    else:
+        fine = levels - 1
+    yield Zone(fine, (0.0, 0.0), alone, np.inf)
 
 
 def _parallel_zone(apart: float, levels: int) -> Zone:
     """For parallel rays, pixels are equally far apart at all distances."""
     fine = int(np.clip(np.floor(np.log2(apart / _BEGIN)), 0, levels - 1))
-    share = (apart / 2.0**fine - _BEGIN) / (_END - _BEGIN)
-    return Zone(fine, (float(np.clip(share, 0, 1)) if fine < levels - 1 else 0.0, 0.0), 0.0, np.inf)
+    share = float(np.clip((apart / 2.0**fine - _BEGIN) / (_END - _BEGIN), 0, 1))
+    if fine == levels - 1 or share == 0:
+        return Zone(fine, (0.0, 0.0), 0.0, np.inf)
+    return Zone(fine + 1, (0.0, 0.0), 0.0, np.inf) if share == 1 else Zone(fine, (share, 0.0), 0.0, np.inf)

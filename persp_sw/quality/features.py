@@ -13,7 +13,7 @@ from ..volume.levels import STANDARD_AXES
 
 # Pieces of the integral over slices; voxels a pixel beyond which coarser levels of detail take fewer slices.
 _PIECES = 64
-COARSER = 2.0
+COARSER = 2**1.5
 
 
 @dataclass(frozen=True)
