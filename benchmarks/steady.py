@@ -86,9 +86,12 @@ def run(rig: Rig, scene: str, recording: str | None, rate: float, options: argpa
         header |= {"min_quality": limits[0], "max_quality": limits[1]}
         file = options.out / f"{label}-{rule.replace(' ', '-')}.jsonl.gz"
         writers[rule] = psw.TraceWriter(file, header)
+    order = list(loops)
     for number in range(-WARM_UP, round(options.seconds * rate)):
         now = (number + WARM_UP) / rate
-        for rule, loop in loops.items():
+        # In turns, for who comes first finds the caches cold.
+        for rule in order[number % len(order) :] + order[: number % len(order)]:
+            loop = loops[rule]
             start = perf_counter()
             frame = loop.frame(now)
             warp_ms = sum(drawers[rule].draw(frame).warp_ms.values())
