@@ -95,7 +95,7 @@ def _composite(
     eye_object: NDArray[np.float64],
     face: Face,
     threads: int,
-    between: tuple[float, float],
+    distances: tuple[float, float],
     cancel: Cancel,
     out: Image,
 ) -> int:
@@ -135,7 +135,7 @@ def _composite(
     taken = 0
     _jit.set_threads(threads)
     for zone in detail_zones(pitch, offset_pitch, back, len(detail) if settings.level_of_detail else 1):
-        near, far = max(zone.near, between[0]), min(zone.far, between[1])
+        near, far = max(zone.near, distances[0]), min(zone.far, distances[1])
         if far <= max(front, near):
             continue
         # Distances along the axis as half-spaces: D ≥ near and D ≤ far.

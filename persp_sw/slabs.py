@@ -42,6 +42,8 @@ _EMPTY = 1e-4
 _HELD = 1e-3
 # What is hidden is kept where a shift by this part of the nearest depth could uncover it, and else left out.
 _UNCOVERED = 1 / 8
+# What is seen may be as flat as one plane; steps of depth must not be.
+_FLAT = 1e-6
 _BLOCK = 8  # pixels; two are a tile
 
 
@@ -75,6 +77,7 @@ class DepthProfile:
         """Measured by compositing a coarse image; of an image with faces, of an eye at a point."""
         eye = np.linalg.solve(image.world_from_object, np.append(image.eye.position, 1))[:3]
         nearest, farthest = depth_range(image.faces, eye, image.box)
+        farthest = max(farthest, (1 + _FLAT) * nearest)
         edges = np.linspace(1 / nearest, 1 / farthest, steps + 1)
         coarser = max(max(max(face.size) for face in image.faces) / _COARSE, 1.0)
         faces = [_coarse(face, coarser) for face in image.faces]

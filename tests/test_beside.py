@@ -112,10 +112,15 @@ def test_walls_have_margins_for_a_head_that_moves_on(loop, fixed_to, shift, turn
 def test_a_frame_is_new_once(loop):
     with Beside(loop, PERIOD) as beside:
         display = Display(beside)
+        display.show(60)  # to full quality, at rest: no further frame is made
+        loop.tracker.at = loop.tracker.at + (0.1, 0, 0)
+        display.show(60)
+        first, again = display.show(), display.show()
+        assert again.frame is first.frame and not first.is_new and not again.is_new
+        loop.steady.held = 0.6
         display.show()
-        first = beside.show(display.now)
-        again = beside.show(display.now)
-        assert first.is_new and (again.frame is not first.frame or not again.is_new)
+        news = [display.show().is_new for _ in range(3)]
+        assert news == [True, False, False]
 
 
 def test_at_rest_it_refines_to_full_quality_and_then_does_nothing(loop):
@@ -241,6 +246,75 @@ def test_a_scene_that_changes_in_every_frame_is_still_shown(loop):
         go_on.release(100)
         assert beside.wait(WAIT)
     assert given_up[:10] == [True, False] * 5
+
+
+def test_walls_keep_their_eyes_until_those_of_another_mode_are_there(loop):
+    begun, go_on = threading.Event(), threading.Event()
+    make = loop.steady.make
+
+    def slow(moment, cancel, resting):
+        if "middle" in moment.sights:
+            begun.set()
+            assert go_on.wait(WAIT)
+        return make(moment, cancel, resting)
+
+    loop.steady.make = slow
+    with Beside(loop, PERIOD) as beside:
+        display = Display(beside)
+        display.show(40)
+        loop.toggle_mono()
+        for n in range(1, 4):
+            shown = beside.show(display.now + n * PERIOD)
+            assert {picture.eye for picture in shown.pictures} == {"left", "right"}
+        assert begun.wait(WAIT)
+        go_on.set()
+        shown = display.show(2)
+        assert {picture.eye for picture in shown.pictures} == {"middle"}
+        assert {s.shown_mode for s in shown.moment.stereo.values()} == {"mono"}
+
+
+def test_compositing_that_takes_longer_than_a_head_is_foreseen_loses_no_head(loop):
+    make = loop.steady.make
+
+    def slow(moment, cancel, resting):
+        frame = make(moment, cancel, resting)
+        return replace(frame, made=replace(frame.made, cost=psw.FrameCost(2000.0, 1.0, 1.0)))
+
+    loop.steady.make = slow
+    with Beside(loop, PERIOD) as beside:
+        display = Display(beside)
+        for _ in range(10):
+            loop.tracker.at = loop.tracker.at + (0.01, 0, 0)
+            shown = display.show()
+        assert loop.head.losses == 0
+        assert np.abs(shown.frame.head.position - loop.tracker.at).max() < 0.1
+        assert display.show(60).frame.made.quality == FULL  # it comes to rest
+
+
+def test_a_key_ends_refinement_under_way(loop):
+    begun, go_on, cancels = threading.Event(), threading.Event(), []
+    make = loop.steady.make
+
+    def slow(moment, cancel, resting):
+        if resting:
+            cancels.append(cancel)
+            begun.set()
+            assert go_on.wait(WAIT)
+        return make(moment, cancel, resting)
+
+    loop.steady.make = slow
+    with Beside(loop, PERIOD) as beside:
+        display = Display(beside)
+        while display.now + PERIOD < RestSettings().seconds:
+            display.show()
+        display.now += 2 * PERIOD
+        beside.show(display.now)
+        assert begun.wait(WAIT)
+        loop.steady.held = 0.4
+        beside.show(display.now + PERIOD)
+        assert cancels[0].is_cancelled
+        go_on.set()
+        assert display.show(3).frame.made.quality == 0.4
 
 
 def test_what_compositing_raises_reaches_the_display(loop):

@@ -214,3 +214,18 @@ def test_a_rig_needs_walls_with_names_of_their_own():
         Rig([])
     with pytest.raises(RigError, match="twice: front"):
         Rig([wall, wall])
+
+
+def test_walls_that_come_and_go_are_not_kept():
+    """A preview has a wall of its own for every frame."""
+    maker = maker_of(cave(), 12)
+    head = Pose((0, 1.7, 1.0))
+    wall = maker.walls[0]
+    for n in range(50):
+        maker.walls = (RigWall(psw.Wall((-1, 0, -1), (1, 0, -1 - 0.01 * n), (-1, 2, -1), (16, 16)), "left"),)
+        maker.moment(head, eyes_at(head))
+    assert len(maker._room_walls) == 1
+    maker.walls = (wall,)
+    one, two = (maker.moment(head, eyes_at(head)) for _ in range(2))
+    (first, *_), (second, *_) = (m.sights["left"].walls for m in (one, two))
+    assert first is second  # made once

@@ -73,3 +73,35 @@ def test_where_nothing_is_seen_there_is_no_depth(scene):
     for wall in (away, WALL, away):
         image = depths.composite("left", eye, lambda wall=wall: renderer.composite(eye, [wall]))
         assert (image.depth is not None) == bool(image.faces) == (wall is WALL)
+
+
+def test_eyes_that_moved_together_take_turns_again(scene):
+    walk = [(12, -30, 12)] * 3 + [(12, -36, 12)] * 90
+    _, measured = images(scene, walk)
+    assert measured[3].all() and not measured[4:].all(1).any()
+    assert (measured[4:].sum(0) >= 2).all()
+
+
+def test_other_faces_and_other_regions_are_measured_anew(scene):
+    renderer, depths = scene
+    inside = psw.Eye(renderer.volume.centre)
+    measured = []
+
+    def look(wall):
+        def make():
+            image = renderer.composite(inside, [wall])
+            measured.append(image.depth is not None)
+            return image
+
+        return depths.composite("left", inside, make)
+
+    back = psw.Wall((40, -60, -40), (-40, -60, -40), (40, -60, 40), pixels=(64, 64))
+    for wall in (WALL, WALL, back, back, back):
+        look(wall)
+    # The image that shows other faces has the old depth, the next one its own.
+    assert measured == [True, False, False, True, False]
+    renderer.regions = replace(renderer.regions, crop=(0, 12, 0, 23, 0, 23))
+    measured.clear()
+    for _ in range(8):
+        look(back)
+    assert measured.count(True) == 1

@@ -40,6 +40,10 @@ def scene() -> psw.Scene:
     return psw.Scene.of_volume(synthetic_ct(48), size=SIZE)
 
 
+def _inside(machine: Machine) -> Any:
+    return machine.pictures._steadies[machine.pictures._window]
+
+
 class Machine:
     """Takes the place of the screen and of the clock.
 
@@ -57,7 +61,7 @@ class Machine:
             scene, settings, size=SIZE, **{"target_hz": TARGET_HZ, **options}
         )
         self.frame_ms = self.drawing_s = self.swap_s = self.clock_s = 0.0
-        for steady in (self.pictures._inside, self.pictures._outside):
+        for steady in self.pictures._steadies.values():
             steady.maker.composite = self._with_its_time(steady.maker.composite)
         self.shown: list[tuple[Any, Any]] = []
         self.now = 0.0
@@ -235,7 +239,7 @@ def test_a_hand_is_answered_while_a_picture_is_refined(machine: Callable[..., Ma
     m.frame_ms = 4.0 * TARGET_MS
     m.turn(10, orbit=0.005)
     begun, cancels = threading.Event(), []
-    make = m.pictures._inside.make
+    make = _inside(m).make
 
     def endless(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
         if resting:
@@ -246,7 +250,7 @@ def test_a_hand_is_answered_while_a_picture_is_refined(machine: Callable[..., Ma
             cancel.check()
         return make(moment, cancel, resting)
 
-    m.pictures._inside.make = endless
+    _inside(m).make = endless
     shown = len(m.shown)
     m.loop.turn(m.preview.advance(m.now))
     assert begun.wait(WAIT)
@@ -267,15 +271,17 @@ def test_a_hand_is_answered_while_a_picture_is_refined(machine: Callable[..., Ma
 def test_the_last_and_best_picture_is_waited_for(machine: Callable[..., Machine]):
     m = machine()
     m.turn(3)
-    go_on, make = threading.Event(), m.pictures._inside.make
+    go_on, make = threading.Event(), _inside(m).make
 
     def slow(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
         frame = make(moment, cancel, resting)
         assert not resting or frame.made.quality < LIMITS.max_quality or go_on.wait(WAIT)
         return frame
 
-    m.pictures._inside.make = slow
-    while not m.pictures.is_refined(m.shown[-1][0]):
+    _inside(m).make = slow
+    for _ in range(2000):
+        if m.pictures.is_refined(m.shown[-1][0]):
+            break
         m.now += 0.02
         m.loop.turn(m.preview.advance(m.now))
     for _ in range(10):
@@ -309,18 +315,34 @@ def test_a_head_that_moves_outside_is_seen_and_one_that_halts_lets_the_room_rest
 def test_what_refining_raises_reaches_the_user(machine: Callable[..., Machine]):
     m = machine()
     m.turn(3)
-    make, faults = m.pictures._inside.make, [psw.PerspSWError("no room for it"), RuntimeError("a fault")]
+    make, faults = _inside(m).make, [psw.PerspSWError("no room for it"), RuntimeError("a fault")]
 
     def failing(moment: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
         if resting and faults:
             raise faults.pop(0)
         return make(moment, cancel, resting)
 
-    m.pictures._inside.make = failing
+    _inside(m).make = failing
     m.turn(2)
     assert m.preview.choices.message == "no room for it"
     with pytest.raises(RuntimeError, match="a fault"):
         m.turn(3)
+
+
+def test_another_preset_walks_its_own_ladder(machine: Callable[..., Machine], monkeypatch):
+    ladders = []
+
+    def ladder_for(renderer: psw.Renderer) -> psw.Ladder:
+        ladders.append(renderer.transfer)
+        return psw.Ladder.default()
+
+    m = machine(presets=("fog", "simulation"))
+    m.turn(3)
+    monkeypatch.setattr(psw, "ladder_for", ladder_for)
+    before = _inside(m).controller
+    m.press(".")
+    assert _inside(m).controller is not before
+    assert ladders == [m.pictures.renderer.transfer]  # once, for both views
 
 
 # --- by hand -----------------------------------------------------------------------------------------------

@@ -201,7 +201,7 @@ def test_quality_follows_the_frame_rate_and_is_refined_at_rest(preview: Preview,
     preview.hand("key", "Escape")
     assert preview.leave()["target_hz"] == 1000.0
     trace = psw.read_trace(tmp_path / "trace.jsonl")
-    refined, quality = trace["refined"].astype(bool), trace["quality"]
+    refined, quality = trace["why"] == "refined", trace["quality"]
     # Four rests; each ends in full quality, which no moving picture at such a rate has.
     ends = np.flatnonzero(refined & ~np.append(refined[1:], False))
     assert len(ends) >= 4

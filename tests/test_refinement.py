@@ -20,13 +20,20 @@ TWO = Ladder(
 ROUNDING = 1e-12
 
 
+def made(refinement, choice, resting):
+    """The next choice, its image finished."""
+    following = refinement.next(choice, resting)
+    refinement.made(following)
+    return following
+
+
 def climb(refinement, choice, count):
-    return [refinement.next(choice, resting=True) for _ in range(count)]
+    return [made(refinement, choice, True) for _ in range(count)]
 
 
 def test_it_climbs_to_full_quality_in_no_more_images_than_promised():
     refinement, choice = Refinement(ONE), Choice(0.4, "all", why="steady")
-    assert refinement.next(choice, resting=False) is choice and not refinement.is_full
+    assert made(refinement, choice, False) is choice and not refinement.is_full
     images = climb(refinement, choice, 20)
     needed = next(n for n, image in enumerate(images, 1) if image.quality == 2.0)
     assert needed <= log(2.0 / 0.4) / refinement.step + 1
@@ -62,7 +69,7 @@ def test_from_a_rung_s_end_it_goes_on_at_equal_cost_on_the_next():
 def test_motion_takes_it_down_in_larger_steps_and_no_lower_than_the_controller_wants():
     refinement, choice = Refinement(ONE), Choice(0.3, "all", why="steady")
     climb(refinement, choice, 20)
-    down = [refinement.next(choice, resting=False) for _ in range(6)]
+    down = [made(refinement, choice, False) for _ in range(6)]
     steps = [log(a.quality / b.quality) for a, b in pairwise(down)]
     assert log(2.0 / down[0].quality) == pytest.approx(3 * refinement.step)
     assert max(steps) <= 3 * refinement.step + ROUNDING
@@ -73,7 +80,7 @@ def test_motion_takes_it_down_in_larger_steps_and_no_lower_than_the_controller_w
 def test_it_falls_back_to_the_rung_that_the_controller_is_on():
     refinement, choice = Refinement(TWO), Choice(0.5, "fast")
     climb(refinement, choice, 20)
-    down = refinement.next(choice, resting=False)
+    down = made(refinement, choice, False)
     assert down.rung == "fast" and down.quality == pytest.approx(2.0 * exp(-0.75))
 
 
@@ -81,21 +88,40 @@ def test_motion_follows_the_controller_however_it_moves():
     refinement = Refinement(ONE)
     for quality in (0.3, 1.9, 0.3, 0.25, 2.0):
         choice = Choice(quality, "all")
-        assert refinement.next(choice, resting=False) is choice
+        assert made(refinement, choice, False) is choice
 
 
 def test_quality_held_by_hand_stays_at_rest_too():
     refinement = Refinement(ONE)
     climb(refinement, Choice(0.5, "all"), 3)
     held = Choice(0.7, "all", why="held")
-    assert refinement.next(held, resting=True) is held
+    assert made(refinement, held, True) is held
     off = Choice(5.0, "all", why="steady")  # beyond the ladder's end
-    assert refinement.next(off, resting=True) is off
+    assert made(refinement, off, True) is off
     choice = Choice(0.5, "all")
-    assert refinement.next(choice, resting=False) is choice  # nothing to come down from
+    assert made(refinement, choice, False) is choice  # nothing to come down from
 
 
 def test_a_better_choice_of_the_controller_is_where_it_starts():
     refinement = Refinement(ONE)
     climb(refinement, Choice(0.3, "all"), 1)
-    assert refinement.next(Choice(1.5, "all"), resting=True).quality == pytest.approx(1.5 * exp(0.25))
+    assert made(refinement, Choice(1.5, "all"), True).quality == pytest.approx(1.5 * exp(0.25))
+
+
+def test_from_the_very_end_of_a_rung_it_climbs_too():
+    """Where a controller stays that cannot afford the next rung; equal costs must not hold it."""
+    refinement = Refinement(TWO)
+    images = climb(refinement, Choice(2.0, "fast", why="most"), 8)
+    assert [image.rung for image in images[:2]] == ["fine", "fine"]
+    assert images[1].quality > images[0].quality
+    assert images[-1].quality == 2.0 and refinement.is_full
+
+
+def test_an_image_that_was_given_up_does_not_count():
+    refinement, choice = Refinement(ONE), Choice(0.4, "all", why="steady")
+    first = refinement.next(choice, resting=True)
+    assert refinement.next(choice, resting=True) == first and not refinement.is_full
+    climb(refinement, choice, 5)
+    up = refinement.next(choice, resting=True)  # given up
+    down = made(refinement, choice, False)
+    assert down.quality < up.quality

@@ -31,7 +31,9 @@ def test_slabs_of_a_solid_hold_its_colour_or_nothing(rng):
         np.testing.assert_allclose(slab.pixels, slab.pixels[:, 3:] * (1, 0.5, 0.2, 1), atol=1e-6)
     first, *_, last = image.slabs
     assert (first.pixels[:, 3] > 0.995).sum() > 2000
-    assert not last.pixels[(first.pixels[:, 3] > 0.995)].all() and last.pixels.any()
+    # Behind what is opaque all but a margin along its edges is left out.
+    behind = last.pixels[first.pixels[:, 3] > 0.995]
+    assert 0 < (behind[:, 3] > 0).mean() < 0.5
 
 
 def shells(image, count):

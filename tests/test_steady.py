@@ -106,9 +106,9 @@ def test_without_a_controller_settings_are_the_user_s_and_quality_can_be_held(ma
     steady, base = Steady(maker), maker.renderer.settings
     moment = maker.moment(*viewer())
     qualities = [steady.make(moment).made.quality]
-    steady.hold(1.25)
+    steady.held = 1.25
     qualities.append(steady.make(moment).made.quality)
-    steady.release()
+    steady.held = None
     qualities.append(steady.make(moment).made.quality)
     assert qualities == [0.5, 1.25, 0.5] and maker.renderer.settings == base
 
@@ -117,10 +117,28 @@ def test_held_quality_reaches_the_controller_and_is_let_go(maker):
     rule = Rule()
     steady = Steady(maker, rule)
     moment = maker.moment(*viewer())
-    steady.hold(1.5)
+    steady.held = 1.5
     held = steady.make(moment).made.quality
-    steady.release()
+    steady.held = None
     assert (held, steady.make(moment).made.quality) == (1.5, 0.7)
+
+
+def test_what_was_given_up_was_not_refined(maker):
+    rule = Rule(0.5)
+    rule.ladder = psw.Ladder((Rung("r", {}, (Point(0.5, 0.25), Point(1.0, 1.0))),))
+    steady = Steady(maker, rule)
+    steady.refinement = psw.Refinement(rule.ladder)
+    moment = maker.moment(*viewer())
+    given_up = psw.Cancel()
+    given_up.cancel()
+    for _ in range(5):
+        with pytest.raises(psw.Cancelled):
+            steady.make(moment, given_up, resting=True)
+    assert not steady.is_refined
+    frames = [steady.make(moment, resting=True) for _ in range(4)]
+    assert frames[0].made.quality == pytest.approx(0.5 * np.exp(0.25))
+    assert frames[-1].made.quality == 1.0 and steady.is_refined
+    assert all(frame.made.refined for frame in frames)
 
 
 def test_a_moment_s_regions_are_what_is_shown(maker):
@@ -151,6 +169,17 @@ def test_a_measured_ladder_is_walked_unless_the_user_chose_the_sampling(maker, t
     assert [rung.changes for rung in controller_for(renderer, aim, 60).ladder.rungs] == [{}]
 
 
+def test_limits_beyond_the_measured_ladder_are_kept(maker, tmp_path, monkeypatch):
+    rungs = (Rung("fast", {"residual": 0.1}, (Point(0.25, 0.1), Point(2.0, 4.0))),)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    renderer = maker.renderer
+    key = saved_ladder.machine_key(None), saved_ladder.volume_key(renderer.volume, renderer.transfer)
+    saved_ladder.save_ladder(psw.Ladder(rungs, *key, saved_ladder.program_key()))
+    for low, high in ((0.05, 0.2), (0.1, 4.0), (3.0, 6.0), (0.5, 1.0)):
+        rung = controller_for(renderer, QualityAim(60, 1, low, high), 60).ladder.rungs[0]
+        assert (rung.name, rung.lowest, rung.highest) == ("fast", pytest.approx(low), pytest.approx(high))
+
+
 def record(maker, frame_ms=10.0, shown_at=None, on_display=True, stamp=5.0):
     frame = Steady(maker, Rule()).make(maker.moment(*viewer(), stamp=stamp))
     moment = frame.moment if shown_at is None else maker.moment(*viewer(shown_at), stamp=stamp + 0.005)
@@ -168,6 +197,18 @@ def test_a_record_says_what_was_done(maker):
     assert r.samples == sum(s["samples"] for s in frame.statistics.values())
     assert r.compositings == 2 and r.faces >= 2
     assert r.latency_ms == pytest.approx(20.0)
+
+
+def test_a_display_s_moment_of_the_same_place_is_no_other(maker):
+    frame = Steady(maker, Rule()).make(maker.moment(*viewer()))
+    again = Shown(frame, maker.moment(*viewer()))
+    r = record_of(0, again, Times(5.0, 5.01, 1, 2, 3, 10), 10.0, on_display=True)
+    assert not r.rewarped and r.shown_head is None
+    maker.room_from_world = maker.room_from_world @ np.diag([1.1, 1.1, 1.1, 1])  # the wand
+    moved = record_of(
+        0, Shown(frame, maker.moment(*viewer())), Times(5.0, 5.01, 1, 2, 3, 10), 10.0, on_display=True
+    )
+    assert moved.rewarped
 
 
 def test_a_record_of_a_head_that_moved_on_has_both_poses(maker):

@@ -55,6 +55,8 @@ def test_ten_frames_by_hand(tmp_path: Path):
         "seconds": 0.1,  # nine gaps of 10 ms and the last frame's own 10 ms
         "hz": 100,
         "target_ms": 10,
+        # All windows of nine, shorter ones at the ends, have 10 ms in their middle: the spike is none's.
+        **dict.fromkeys(("running_p50", "running_p95", "running_p99", "within_running"), 1.0),
         "frame_ms_p50": 10,
         "frame_ms_p95": 11.1 + 0.55 * 8.9,
         "frame_ms_p99": 11.1 + 0.91 * 8.9,
@@ -190,3 +192,12 @@ def test_a_long_session_by_numpy(tmp_path: Path):
     assert figures["hz"] == pytest.approx(
         900 / sum(max(r.frame_ms, 1e3 / 90) / 1e3 for r in records), rel=1e-3
     )
+
+
+def test_a_step_of_the_load_stays_where_it_is_without_noise(tmp_path: Path):
+    records = [
+        psw.FrameRecord(i, i / 100, target_ms=10.0, frame_ms=10.0 if i < 10 else 20.0) for i in range(20)
+    ]
+    figures = figures_of(tmp_path, records)
+    assert (figures["within_running"], figures["running_p50"]) == (0.5, 1.5)
+    assert figures["running_p95"] == figures["running_p99"] == 2.0

@@ -4,6 +4,7 @@ head is now."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import TracebackType
 
 import numpy as np
 
@@ -35,6 +36,20 @@ class Order:
     wanted: tuple[object, ...]
     resting: bool = False
 
+    def is_same(self, other: Order) -> bool:
+        """Whether the same is to be composited, but for what refinement adds."""
+        same = self.moment is other.moment and self.resting == other.resting
+        return same and self.wanted == other.wanted
+
+    def is_useless_for(self, other: Order) -> bool:
+        """Whether nobody would wait for this any more who now asks for `other`."""
+        return (
+            self.wanted != other.wanted
+            or self.moment.regions is not other.moment.regions
+            or not np.array_equal(self.moment.room_from_world, other.moment.room_from_world)
+            or (self.resting and not other.resting)
+        )
+
 
 class Beside:
     """Frames of a loop, one after another composited by a thread of its own.
@@ -46,8 +61,8 @@ class Beside:
     ----------
     loop
         Its eye images are made to be seen from elsewhere (`Settings.depth_slabs`, at least 1). Its tracker is
-        polled by `show`, its renderer works in the thread: change its settings through `loop.steady.base`,
-        its regions through `loop.regions`.
+        polled by `show`, its renderer works in the thread: change its settings through `loop.steady`, its
+        regions through `loop.regions`.
     period_s
         Of the display.
     """
@@ -58,8 +73,9 @@ class Beside:
         steady.base = replace(steady.base, depth_slabs=max(steady.base.depth_slabs, 1))
         steady.refinement = None if controller is None else psw.Refinement(controller.ladder)
         self._rest = RestWatch()
-        self._worker = Worker(self._work)
-        self._making_s = period_s  # what a frame takes, smoothed
+        self._at_rest: tuple[Moment, Moment] | None = None  # the rest's anchor, and what is refined for it
+        self._worker: Worker[Order, Frame] = Worker(self._work)
+        self._making_s = period_s  # what a frame of a moving head takes, smoothed
         self._asked: Order | None = None
         self._gave_up = False  # since the last frame
         self._shown: Frame | None = None
@@ -72,18 +88,18 @@ class Beside:
         Exception
             Whatever compositing raised.
         """
-        loop = self.loop
-        frame: Frame | None = self._worker.newest()
+        loop, frame = self.loop, self._worker.newest()
         loop.poll(now)
-        moment = loop.moment(now + self.period_s)
-        loop.look(moment)
         is_new = frame is not self._shown
         if is_new:
-            cost = frame.made.cost
-            self._making_s += _FOLLOW * (1e-3 * (cost.ms + cost.planning_ms) - self._making_s)
-            self._shown, self._gave_up = frame, False
-        self._ask(now)
-        return None if frame is None else Shown(frame, moment, is_new)
+            self._take(frame)
+        # Walls show what the frame has eyes for, until one of a new mode is finished.
+        moment = loop.moment(now + self.period_s, stereo=frame.moment.stereo if frame else None)
+        self._ask(moment, now)
+        if frame is None:
+            return None
+        loop.look(moment)
+        return Shown(frame, moment, is_new)
 
     def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
         """Nothing: compositing does not wait for the display."""
@@ -99,39 +115,43 @@ class Beside:
     def __enter__(self) -> Beside:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._worker.__exit__(kind, error, trace)
 
-    def _ask(self, now: float) -> None:
-        moment = self.loop.moment(now + self.period_s + self._making_s, _MARGINS)
-        wanted = self.loop.steady.base, self.loop.steady.held
-        if self._rest.look(moment, now):
-            order = Order(self._rest.anchor, wanted, resting=True)
-            if self._is_asked(order) and (self._worker.is_busy or self.loop.steady.is_refined):
+    def _take(self, frame: Frame) -> None:
+        self._shown, self._gave_up = frame, False
+        if not frame.made.refined:
+            spent_s = 1e-3 * (frame.made.cost.ms + frame.made.cost.planning_ms)
+            self._making_s += _FOLLOW * (spent_s - self._making_s)
+
+    def _ask(self, seen: Moment, now: float) -> None:
+        wanted = self.loop.steady.base, self.loop.steady.held, self.loop.modes
+        if self._rest.look(seen, now):
+            order = Order(self._resting(now), wanted, resting=True)
+            same = self._asked is not None and self._asked.is_same(order)
+            if same and (self._worker.is_busy or self.loop.steady.is_refined):
                 return
         else:
-            order = Order(moment, wanted)
-        self._worker.ask(order, cancel_running=self._is_useless(order))
+            order = Order(self._ahead(now), wanted)
+        doing = self._worker.doing
+        useless = doing is not None and not self._gave_up and doing.is_useless_for(order)
+        self._gave_up |= self._worker.ask(order, cancel_running=useless)
         self._asked = order
 
-    def _is_asked(self, order: Order) -> bool:
-        asked = self._asked
-        return asked is not None and (asked.moment, asked.wanted, asked.resting) == (
-            order.moment,
-            order.wanted,
-            order.resting,
-        )
+    def _resting(self, now: float) -> Moment:
+        """One moment for all of a rest: of its anchor's time, with the eyes that walls show now."""
+        anchor = self._rest.anchor
+        known = self._at_rest
+        if known is None or known[0] is not anchor or known[1].stereo != self.loop.stereo:
+            self._at_rest = anchor, self._ahead(now)
+        return self._at_rest[1]
 
-    def _is_useless(self, order: Order) -> bool:
-        """Whether what is being composited is not worth waiting for; never twice in a row without a frame."""
-        asked = self._asked
-        if asked is None or self._gave_up:
-            return False
-        other_scene = asked.moment.regions is not order.moment.regions or not np.array_equal(
-            asked.moment.room_from_world, order.moment.room_from_world
-        )
-        self._gave_up = other_scene or (asked.resting and not order.resting)
-        return self._gave_up
+    def _ahead(self, now: float) -> Moment:
+        """When an image begun now will be seen, as far as a head's motion can be foreseen."""
+        ahead_s = min(self.period_s + self._making_s, self.loop.head.settings.look_ahead)
+        return self.loop.moment(now + ahead_s, _MARGINS)
 
     def _work(self, order: Order, cancel: psw.Cancel) -> Frame:
         frame = self.loop.steady.make(order.moment, cancel, order.resting)

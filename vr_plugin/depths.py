@@ -11,15 +11,23 @@ import persp_sw as psw
 
 # Measuring takes as long as a small image; so once in so many images of an eye,
 _EVERY = 30
-# or when it has moved by more than this part of the depth (along an axis, in voxels).
+# or when it has moved by more than this part of the depth (along an axis, in voxels), or sees something else.
 _MOVED = 0.05
+
+
+# Images after which another clip plane counts: a dragged one is another in each frame.
+_CLIPPED = 5
 
 
 @dataclass
 class _Known:
+    """A depth; where it was measured, of which faces and regions; how many images ago."""
+
     depth: float
-    eye: np.ndarray  # world position it was measured for
-    images: int  # since
+    eye: np.ndarray
+    faces: frozenset[tuple[int, int]]
+    regions: psw.Regions
+    images: int
 
 
 class KeptDepths:
@@ -40,24 +48,35 @@ class KeptDepths:
         settings, known = self._renderer.settings, self._known.get(name)
         if settings.depth_slabs != 1:
             return make()
-        if known is None or known.images >= _EVERY or self._moved(known, eye):
-            image = make()
-            if image.depth is None:  # it shows nothing
-                self._known.pop(name, None)
-            else:
-                # Eyes that begin together take turns afterwards: no frame measures both.
-                begun = 0 if known else len(self._known) * (_EVERY // 2)
-                self._known[name] = _Known(image.depth, eye.position, begun)
-            return image
+        if known is None or known.images >= _EVERY or self._is_elsewhere(known, eye):
+            return self._measured(name, eye, make)
         self._renderer.settings = replace(settings, depth_slabs=0)
         try:
             image = make()
         finally:
             self._renderer.settings = settings
-        known.images += 1
+        known.images = _EVERY if _faces(image) != known.faces else known.images + 1
         return replace(image, depth=known.depth) if image.faces else image
 
-    def _moved(self, known: _Known, eye: psw.Eye) -> bool:
+    def _measured(self, name: str, eye: psw.Eye, make: Callable[[], psw.EyeImage]) -> psw.EyeImage:
+        due = name in self._known and self._known[name].images >= _EVERY
+        image = make()
+        if image.depth is None:  # it shows nothing
+            self._known.pop(name, None)
+            return image
+        known = _Known(image.depth, eye.position, _faces(image), self._renderer.regions, 0)
+        self._known[name] = known
+        if not due:  # both eyes at once, that is; the next time they take turns
+            known.images = list(self._known).index(name) * (_EVERY // 2)
+        return image
+
+    def _is_elsewhere(self, known: _Known, eye: psw.Eye) -> bool:
+        if known.regions is not self._renderer.regions and known.images >= _CLIPPED:
+            return True
         linear = self._renderer.volume.world_from_object[:3, :3]
         shift = np.linalg.solve(linear, eye.position - known.eye)
         return bool(np.abs(shift).max() > _MOVED * known.depth)
+
+
+def _faces(image: psw.EyeImage) -> frozenset[tuple[int, int]]:
+    return frozenset((face.axis, face.sign) for face in image.faces)

@@ -64,6 +64,11 @@ class Made:
     cost: psw.FrameCost
     begun_s: float
 
+    @property
+    def refined(self) -> bool:
+        """Whether it took more time than a frame has: at rest, or on the way back."""
+        return self.choice is not None and self.choice.why in ("refined", "falling")
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -139,11 +144,21 @@ class FrameMaker:
 
     def __init__(self, renderer: psw.Renderer, walls: Sequence[RigWall], room_from_world: np.ndarray):
         self.renderer = renderer
-        self.walls = tuple(walls)
+        self._walls = tuple(walls)
         self.room_from_world = room_from_world
         self._depths = KeptDepths(renderer)
         self._previous: dict[str, psw.EyeImage] = {}
         self._said: set[str] = set()
+
+    @property
+    def walls(self) -> tuple[RigWall, ...]:
+        """In room space; may be assigned between frames."""
+        return self._walls
+
+    @walls.setter
+    def walls(self, walls: Sequence[RigWall]) -> None:
+        self._walls = tuple(walls)
+        self._room_walls.clear()
 
     @property
     def room_from_world(self) -> np.ndarray:

@@ -99,20 +99,26 @@ class Loop:
             clip = (*self._regions.clip, *self.wand.clip_planes)
             self.regions = replace(self._regions, clip=clip)
 
-    def moment(self, shown_at: float, margins: Mapping[str, float] = MappingProxyType({})) -> Moment:
+    def moment(
+        self,
+        shown_at: float,
+        margins: Mapping[str, float] = MappingProxyType({}),
+        stereo: Mapping[str, Stereo] | None = None,
+    ) -> Moment:
         """What the eyes see at a time that may lie ahead: the head goes on as it moves.
 
-        `margins`: see `FrameMaker.moment`.
+        `margins`: see `FrameMaker.moment`. `stereo`: where walls do not show the eyes as they are to now.
         """
+        stereo = self.stereo if stereo is None else stereo
         head = self.head.pose_at(shown_at)
-        eyes = eyes_of_head(head, self.rig.eyes)
         return self.maker.moment(
             head,
-            eyes,
+            eyes_of_head(head, self.rig.eyes),
             self.rig.eyes.near,
-            self.modes,
+            {name: wall.shown_mode for name, wall in stereo.items()},
             margins,
             regions=self.regions,
+            stereo=stereo,
             stamp=self.head.stamp,
         )
 

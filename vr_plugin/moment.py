@@ -12,6 +12,7 @@ import persp_sw as psw
 from .eyes import EyePair
 from .pose import Pose
 from .rig import RigWall
+from .stereo import Stereo
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class Moment:
         Names of walls in whose plane an eye lies, which can show it nothing.
     room_from_world
         (4, 4): where the volume stands.
+    stereo
+        By wall name: how each wall shows the eyes.
     stamp
         When the tracker saw the head, seconds of the loop's clock; None where nothing tracks.
     """
@@ -53,4 +56,5 @@ class Moment:
     regions: psw.Regions | None = None
     edge_on: Sequence[str] = ()
     room_from_world: np.ndarray = field(default_factory=lambda: np.eye(4))
+    stereo: Mapping[str, Stereo] = field(default_factory=dict)
     stamp: float | None = None

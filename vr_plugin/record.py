@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from math import ceil
 from typing import NamedTuple
 
+import numpy as np
+
 import persp_sw as psw
 
+from .moment import Moment
 from .pose import Pose
 from .shown import Shown
 
@@ -43,13 +46,13 @@ def record_of(
     choice = made.choice if made else None
     cost = made.cost if made and shown.is_new else None
     stamp = shown.moment.stamp
-    refined = choice is not None and choice.why == "refined"
+    moved = shown.moment is not frame.moment and not _is_same_place(shown.moment, frame.moment)
     return psw.FrameRecord(
         number,
         times.begin_s,
         shown_s=times.end_s if on_display else None,
         head=_numbers(frame.head),
-        shown_head=None if shown.moment is frame.moment else _numbers(shown.moment.head),
+        shown_head=_numbers(shown.moment.head) if moved else None,
         target_ms=target_ms,
         budget_ms=choice.budget_ms if choice else None,
         quality=made.quality if made else None,
@@ -69,9 +72,15 @@ def record_of(
         faces=sum(len(image.faces) for image in frame.images.values()),
         compositings=frame.compositings if shown.is_new else 0,
         image_age_ms=1e3 * (times.end_s - made.begun_s) if made and on_display else None,
-        rewarped=shown.moment is not frame.moment,
-        refined=refined,
+        rewarped=moved,
+        refined=made is not None and made.refined,
     )
+
+
+def _is_same_place(one: Moment, other: Moment) -> bool:
+    """Whether images of one moment are just what is seen at the other."""
+    places = ((m.room_from_world, m.head.position, m.head.orientation) for m in (one, other))
+    return all(np.array_equal(a, b) for a, b in zip(*places, strict=True))
 
 
 def _numbers(pose: Pose) -> Sequence[float]:

@@ -44,8 +44,11 @@ class Source(Protocol):
     def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
         """What drawing it took."""
 
-    def close(self) -> None:
-        """Give up what is not finished."""
+    def __enter__(self) -> Source:
+        """Ready; what is not finished at the end is given up."""
+
+    def __exit__(self, *error: object) -> None:
+        """The end."""
 
 
 class InTurn:
@@ -69,5 +72,8 @@ class InTurn:
         """Compositing has only what drawing leaves."""
         self.loop.steady.drawn(shown.frame, upload_ms, warp_ms, swap_ms)
 
-    def close(self) -> None:
+    def __enter__(self) -> InTurn:
+        return self
+
+    def __exit__(self, *error: object) -> None:
         """Nothing is left to do."""

@@ -27,7 +27,8 @@ class Steady:
     base
         The user's settings, which may be assigned at any time.
     held
-        Quality held by hand; None where it is free, or as in `base`.
+        Quality that every frame has, at rest, too; None: it is free, or as in `base`. May be assigned at any
+        time, in any thread.
     refinement
         Of a resting viewer's pictures; None: rest changes nothing.
     """
@@ -37,21 +38,8 @@ class Steady:
         self.base = maker.renderer.settings
         self.held: float | None = None
         self.refinement: psw.Refinement | None = None
-        # A frame whose upload, warp and swap are still to come, and one whose are known.
-        self._drawn: Frame | None = None
+        self._controller_holds: float | None = None
         self._finished: deque[tuple[psw.FrameCost, psw.Choice]] = deque(maxlen=1)
-
-    def hold(self, quality: float) -> None:
-        """Every frame with this quality, at rest, too."""
-        if self.controller is not None:
-            self.controller.hold(quality)
-        self.held = quality
-
-    def release(self) -> None:
-        """Quality is free again; without a controller as the user set it."""
-        if self.controller is not None:
-            self.controller.release()
-        self.held = None
 
     @property
     def is_refined(self) -> bool:
@@ -78,7 +66,7 @@ class Steady:
         Raises
         ------
         Cancelled
-            `cancel` was, meanwhile; the next frame goes on as if this one had not been asked for.
+            `cancel` was, meanwhile. The controller has made its step, refinement has not.
         """
         renderer = self.maker.renderer
         begun_s = monotonic() if begun_s is None else begun_s
@@ -91,11 +79,26 @@ class Steady:
         plans = self.maker.plan(moment)
         features = renderer.features_of_plans(plans.values())
         measured, of = self._finished.pop() if self._finished else (None, None)
+        self._hold_or_release()
         choice = self.controller.next(features, measured, of)
         if self.refinement is not None:
             choice = self.refinement.next(choice, resting)
         renderer.settings = choice.apply(self.base)
-        return self._made(self.maker.composite(moment, cancel, plans), choice.quality, choice, begun_s)
+        frame = self.maker.composite(moment, cancel, plans)
+        if self.refinement is not None:
+            self.refinement.made(choice)
+        return self._made(frame, choice.quality, choice, begun_s)
+
+    def _hold_or_release(self) -> None:
+        """Tell the controller, here, for it belongs to the thread that composites."""
+        held = self.held
+        if held == self._controller_holds:
+            return
+        if held is None:
+            self.controller.release()
+        else:
+            self.controller.hold(held)
+        self._controller_holds = held
 
     def _made(self, frame: Frame, quality: float, choice: psw.Choice | None, begun_s: float) -> Frame:
         names = ("composite_ms", "encode_ms", "compile_ms")

@@ -43,7 +43,7 @@ class Worker(Generic[Task, Result]):
         self._work = work
         self._changed = Condition()
         self._waiting: tuple[Task, psw.Cancel] | None = None
-        self._running: psw.Cancel | None = None
+        self._running: tuple[Task, psw.Cancel] | None = None
         self._result: Result | None = None
         self._error: BaseException | None = None
         self._closed = False
@@ -52,11 +52,11 @@ class Worker(Generic[Task, Result]):
         self._thread.start()
         atexit.register(self._give_up, PATIENCE)
 
-    def ask(self, task: Task, cancel_running: bool = False) -> None:
+    def ask(self, task: Task, cancel_running: bool = False) -> bool:
         """Have `task` done as soon as the thread is free; one that still waits is never started.
 
         `cancel_running`: the one being done is not worth finishing. Cancelled work leaves no result; so if
-        every task is cancelled by the next, there never is one.
+        every task is cancelled by the next, there never is one. Returns whether one was cancelled.
 
         Raises
         ------
@@ -67,9 +67,17 @@ class Worker(Generic[Task, Result]):
             if self._closed:
                 raise RuntimeError("this worker is closed")
             self._waiting = task, psw.Cancel()
-            if cancel_running and self._running is not None:
-                self._running.cancel()
+            cancelled = cancel_running and self._running is not None
+            if cancelled:
+                self._running[1].cancel()
             self._changed.notify_all()
+        return cancelled
+
+    @property
+    def doing(self) -> Task | None:
+        """The task being done; None while there is none."""
+        with self._changed:
+            return None if self._running is None else self._running[0]
 
     def newest(self) -> Result | None:
         """The result of the newest finished task, the same until there is a newer one; None before the first.
@@ -133,7 +141,7 @@ class Worker(Generic[Task, Result]):
         with self._changed:
             self._closed, self._waiting = True, None
             if self._running is not None:
-                self._running.cancel()
+                self._running[1].cancel()
             self._changed.notify_all()
         self._thread.join(patience)
         if self._thread.is_alive():
@@ -149,7 +157,7 @@ class Worker(Generic[Task, Result]):
         with self._changed:
             self._changed.wait_for(lambda: self._closed or self._waiting is not None)
             job, self._waiting = self._waiting, None
-            self._running = None if job is None else job[1]
+            self._running = job
             return job
 
     def _do(self, task: Task, cancel: psw.Cancel) -> None:

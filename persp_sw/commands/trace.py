@@ -23,7 +23,7 @@ _PICTURE = "trace.png"
 _NEEDS = "the picture of a trace needs the package matplotlib: pip install 'persp-sw[bench]'"
 _EPILOG = """\b
 Examples:
-  persp-sw cave rigs/cave4.toml head.nrrd --trace run.jsonl.gz    record a session
+  persp-sw cave configs/cave4.toml head.nrrd --trace run.jsonl.gz    record a session
   persp-sw trace run.jsonl.gz                                     figures, and trace.png
   persp-sw trace before.jsonl after.jsonl -o compare.svg          side by side
   persp-sw trace run.jsonl.gz --json                              for programs, no picture
@@ -150,6 +150,7 @@ _FIGURES: tuple[tuple[str, Callable[[dict[str, Any]], str]], ...] = (
     ("… of frames at no limit of quality", _percent("within_free")),
     ("frame, ms: p50, p95, p99, most", _several(".1f", *(f"frame_ms_{p}" for p in (*_SHARES, "max")))),
     ("frame over target: p50, p95, p99", _several(".2f", *(f"of_target_{p}" for p in _SHARES))),
+    ("… without single frames' noise", _several(".2f", *(f"running_{p}" for p in _SHARES))),
     ("compositing within ± 10 % of budget", _percent("within_budget")),
     ("refreshes missed, most in a row", _several("d", "missed", "missed_most")),
     ("quality: least, median, most", _several(".2f", "quality_least", "quality_median", "quality_most")),

@@ -25,7 +25,7 @@ FORMAT, VERSION = "persp_sw trace", 1
 
 # Decimals kept: microseconds, micrometres and parts in a million; of milliseconds 0.1 µs.
 _DECIMALS, _MS_DECIMALS = 6, 4
-# Two seconds of frames at 90 Hz, which a crash would lose.
+# Two seconds of frames at 90 Hz, which a crash would lose; compressed, as much after compression.
 _BUFFER_BYTES = 1 << 16
 # Better levels make it 8 % smaller at most and cost more of the frame's time.
 _GZIP_LEVEL = 1
@@ -149,9 +149,9 @@ _FIELDS = tuple((f.name, f.default, _keeper(f.name, str(f.type))) for f in field
 class TraceWriter:
     """Writes a trace, as a context manager or until `close`.
 
-    It costs a frame about 30 µs, compressed 35; one in some 200 hands 64 KiB to the system. What cannot be
-    written once the session runs (a full disk) does not end it: that is said once, and nothing more is
-    written.
+    It costs a frame about 30 µs, compressed 35; one in some 200 (compressed: some 1000) hands what is
+    buffered to the system. What cannot be written once the session runs (a full disk) does not end it: that
+    is said once, and nothing more is written.
 
     Parameters
     ----------

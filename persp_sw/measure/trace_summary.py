@@ -15,6 +15,8 @@ WITHIN = 0.1
 # Two qualities this near are the same: traces keep six decimals.
 _SAME_QUALITY = 1e-4
 _PERCENTILES = (50, 95, 99)
+# Frames whose median is a load without its noise.
+_RUNNING = 9
 
 
 def summary(trace: Trace) -> dict[str, Any]:
@@ -34,6 +36,9 @@ def summary(trace: Trace) -> dict[str, Any]:
             The median, if it changed.
         frame_ms_p50, _p95, _p99, _max; of_target_p50, _p95, _p99
             Times of whole frames, and these over their targets.
+        running_p50, _p95, _p99; within_running
+            The same of running medians of nine frames: what a rule makes of the load, without the noise of
+            single frames, which it cannot know before.
         within, within_free
             Share of the frames within ±10 % of their target; the same of the free frames.
         within_budget
@@ -66,6 +71,7 @@ def summary(trace: Trace) -> dict[str, Any]:
     ms = frame_ms(trace)
     target = trace["target_ms"]
     of_target = ms / np.where(target > 0, target, math.nan)
+    running = _running_median(of_target)
     compositing = trace["composite_ms"] + np.nan_to_num(trace["planning_ms"])
     of_budget = compositing / np.where(trace["budget_ms"] > 0, trace["budget_ms"], math.nan)
     free = _free(trace)
@@ -79,6 +85,8 @@ def summary(trace: Trace) -> dict[str, Any]:
         **_percentiles("frame_ms", ms),
         "frame_ms_max": _percentile(ms, 100),
         **_percentiles("of_target", of_target),
+        **_percentiles("running", running),
+        "within_running": _share_within(running),
         "within": _share_within(of_target),
         "within_free": None if free is None else _share_within(of_target[free == 1]),
         "within_budget": _share_within(of_budget),
@@ -99,6 +107,16 @@ def frame_ms(trace: Trace) -> np.ndarray:
     """(n,) what each frame took; where it does not say, the time to the next one's beginning."""
     gaps = np.append(np.diff(trace["time_s"]) * 1e3, math.nan)
     return np.where(np.isnan(trace["frame_ms"]), gaps, trace["frame_ms"])
+
+
+def _running_median(values: np.ndarray) -> np.ndarray:
+    """(n,) of the nine values around each, at the ends of those there are; NaN values do not count."""
+    padded = np.pad(values, _RUNNING // 2, constant_values=math.nan)
+    around = np.lib.stride_tricks.sliding_window_view(padded, _RUNNING)
+    known = ~np.isnan(around).all(1)
+    median = np.full(len(values), math.nan)
+    median[known] = np.nanmedian(around[known], axis=1)
+    return median
 
 
 def quality_limits(trace: Trace) -> tuple[float, float] | None:

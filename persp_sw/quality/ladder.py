@@ -139,6 +139,16 @@ class Ladder:
             raise SettingsError(f"no rung has qualities between {lowest:g} and {highest:g}: widen the limits")
         return replace(self, rungs=ascending(kept))
 
+    def extended(self, lowest: float, highest: float) -> Ladder:
+        """The same rungs, the first down to a quality and the last up to one, as their costs go on there."""
+        first, *rest = self.rungs
+        if lowest < first.lowest:
+            first = replace(first, points=(Point(lowest, first.cost_at(lowest)), *first.points))
+        *before, last = first, *rest
+        if highest > last.highest:
+            last = replace(last, points=(*last.points, Point(highest, last.cost_at(highest))))
+        return replace(self, rungs=(*before, last))
+
     def fits(self, machine: str, volume: str) -> bool:
         """Whether it was measured on this machine and volume."""
         return (self.machine, self.volume) == (machine, volume)

@@ -30,32 +30,36 @@ class Refinement:
 
     def __init__(self, ladder: Ladder, step: float = _STEP):
         self.ladder, self.step = ladder, step
-        self._drawn: tuple[int, float] | None = None  # rung and quality of the last image
+        self._made: tuple[int, float] | None = None  # rung and quality of the last image
         self._above = False  # whether that is more than the controller would have drawn
 
     @property
     def is_full(self) -> bool:
-        """Whether the image drawn last is at full quality: nothing is left to refine."""
-        return self._drawn == (len(self.ladder.rungs) - 1, self.ladder.rungs[-1].highest)
+        """Whether the image made last is at full quality: nothing is left to refine."""
+        return self._made == (len(self.ladder.rungs) - 1, self.ladder.rungs[-1].highest)
 
     def next(self, choice: Choice, resting: bool) -> Choice:
-        """What to composite next, where the controller would draw `choice`."""
+        """What to composite next, where the controller would draw `choice`; `made` tells that it was."""
         chosen = self._place(choice)
         if chosen is None or choice.why == "held":  # by hand: as it is wanted, at rest, too
-            self._drawn, self._above = None, False
             return choice
-        place, why = chosen, choice.why
         if resting:
-            place, why = self._up(self._higher(self._drawn or chosen, chosen)), "refined"
+            place, why = self._up(self._higher(self._made or chosen, chosen)), "refined"
         elif self._above:
-            place, why = self._down(self._drawn, chosen), "falling"
-        self._above, self._drawn = place != chosen, place
+            place, why = self._down(self._made, chosen), "falling"
+        else:
+            return choice
         if place == chosen:
             return choice
         rung = self.ladder.rungs[place[0]]
         return replace(
             choice, quality=place[1], rung=rung.name, changes=rung.changes, expected_ms=None, why=why
         )
+
+    def made(self, choice: Choice) -> None:
+        """The image of a choice of `next` is finished."""
+        self._above = choice.why in ("refined", "falling")
+        self._made = None if choice.why == "held" else self._place(choice)
 
     def _place(self, choice: Choice) -> tuple[int, float] | None:
         for index, rung in enumerate(self.ladder.rungs):
@@ -68,7 +72,8 @@ class Refinement:
         return self.ladder.rungs[place[0]].cost_at(place[1])
 
     def _higher(self, one: tuple[int, float], other: tuple[int, float]) -> tuple[int, float]:
-        return one if self._cost(one) > self._cost(other) else other
+        """`one`, but where `other` costs more. A rung's end and the next one's entry differ by rounding."""
+        return other if self._cost(other) > (1 + 1e-9) * self._cost(one) else one
 
     def _up(self, place: tuple[int, float]) -> tuple[int, float]:
         index, quality = place

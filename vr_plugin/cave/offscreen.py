@@ -50,12 +50,13 @@ class Costs:
     def add(self, frame: Frame, drawn: Drawn, ms: float) -> None:
         """A timed frame."""
         self.ms.append(ms)
-        self.composite_ms.append(sum(s["composite_ms"] for s in frame.statistics.values()))
+        cost = frame.cost()
+        self.composite_ms.append(cost.ms)
         self.upload_ms.append(drawn.upload_ms)
         for key, spent in drawn.warp_ms.items():
             self.warp_ms.setdefault(key, []).append(spent)
         self.compositings.append(frame.compositings)
-        self.samples.append(sum(s["samples"] for s in frame.statistics.values()))
+        self.samples.append(int(cost.samples))
 
     def report(self) -> dict[str, Any]:
         """Medians, as `--json` has them."""

@@ -13,7 +13,7 @@ from typing import Any
 import persp_sw as psw
 
 from ..beside import Beside
-from ..frame import Picture
+from ..frame import Frame, Picture
 from ..loop import Loop
 from ..present import Composer
 from ..record import Times, record_of
@@ -105,6 +105,7 @@ class WindowLoop:
         # Whoever asks what drawing takes has to wait for it: OpenGL draws while the program goes on.
         self.timed = trace is not None or isinstance(source, InTurn)
         self.target_ms = 1e3 / loop.rig.quality.target_hz
+        self._uploaded: Frame | None = None
         self._end_s: float | None = None
         walks = isinstance(loop.tracker, MouseTracker)
         self._events = TrackerEvents(loop.tracker) if walks else None
@@ -148,7 +149,7 @@ class WindowLoop:
         elif key in ("-", "KP_SUBTRACT"):
             self._set_quality(1 / QUALITY_STEP)
         elif key == "0":
-            loop.steady.release()
+            loop.steady.held = None
         elif key == "V":
             loop.put_back()
         else:
@@ -159,7 +160,7 @@ class WindowLoop:
         """Hold it by hand, from where it is."""
         steady, limits = self.loop.steady, self.loop.rig.quality
         quality = factor * (steady.held or self.loop.renderer.settings.quality)
-        steady.hold(min(max(quality, limits.min_quality), max(limits.max_quality, steady.base.quality)))
+        steady.held = min(max(quality, limits.min_quality), max(limits.max_quality, steady.base.quality))
 
     def _show(self, windows: Windows, walls: Sequence[WallWindow], warp: Any) -> None:
         begin = time.monotonic()
@@ -169,14 +170,15 @@ class WindowLoop:
             return
         clock = [time.monotonic()]
         drawn = [wall for wall in walls if wall.window.is_drawn]
-        if drawn and shown.is_new:
+        if drawn and shown.frame is not self._uploaded:  # not `is_new`: no window may have been drawn then
             drawn[0].window.make_current()
             for eye, image in shown.frame.images.items():
                 warp.upload(image, eye)
+            self._uploaded = shown.frame
         clock.append(time.monotonic())
         pictures = shown.pictures
         for wall in drawn:
-            stereo = self.loop.stereo[wall.rig_wall.name]
+            stereo = shown.frame.moment.stereo[wall.rig_wall.name]
             wall.draw(pictures, stereo.channels, stereo.shown_mode, warp, self.background)
             if self.timed:
                 wall.composer.finish()
@@ -225,11 +227,8 @@ def run_windows(
     period_s = 1 / loop.rig.quality.target_hz
     source = InTurn(loop, period_s) if in_turn else Beside(loop, period_s)
     shown = WindowLoop(loop, source, background, trace)
-    try:
-        with suppress(KeyboardInterrupt):  # Ctrl-C in the terminal ends it as escape does
-            shown.run(frames)
-    finally:
-        source.close()
+    with suppress(KeyboardInterrupt), source:  # Ctrl-C in the terminal ends it as escape does
+        shown.run(frames)
     records = list(shown.records)[1 if shown.frames <= _RECORDS else 0 :] or shown.records
     return {
         "warp": "texture",

@@ -60,7 +60,9 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
 @click.option("--offscreen", is_flag=True, help="No windows: write each wall's picture.")
 @click.option("--frames", type=click.IntRange(1), metavar="N", help="Timed frames; offscreen 10 by default.")
 @click.option("--path", "recording", type=click.Path(), help="Recorded head path, .csv or .csv.gz.")
-@click.option("--rate", type=click.FloatRange(1, 1000), help="Frames a second of the path; the rig's aim.")
+@click.option(
+    "--rate", type=click.FloatRange(1, 1000), help="Frames a second, of the path too; the rig's aim."
+)
 @click.option("--start", type=click.FloatRange(0), default=0.0, help="Seconds into the path to begin at.")
 @click.option("--every", type=click.IntRange(1), metavar="K", help="Write every K-th frame, too.")
 @click.option("--warp", type=click.Choice(["auto", "texture", "software"]), default="auto", show_default=True)
@@ -77,7 +79,7 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
     type=click.IntRange(1, 8),
     default=1,
     show_default=True,
-    help="Depth slabs of eye images shown to a head that moved on; 2 … 4 pay in fog.",
+    help="With windows: depth slabs of eye images, for a head that moves on; 2 … 4 pay in fog.",
 )
 @click.option(
     "--trace", "trace_file", type=click.Path(), help="Record every frame; see persp-sw trace --help."
@@ -147,6 +149,7 @@ def cave(
             start=0.0 if offscreen else None,
         )
         rate = rate or chosen.quality.target_hz
+        chosen = replace(chosen, quality=replace(chosen.quality, target_hz=rate))
         adapts = not offscreen if adapt is None else adapt
         controller = controller_for(renderer, chosen.quality, rate) if adapts else None
         loop = Loop(chosen, renderer, tracker, controller)
@@ -263,8 +266,9 @@ def _median(costs: Costs, wall: str, eye: str) -> float:
 
 def _print(values: dict[str, Any]) -> None:
     rows = {"rig": f"{values['rig']}: {', '.join(values['walls'])}"}
+    what = "a frame" if "pictures" in values else "from frame to frame"  # a display's waits included
     rows["time"] = (
-        f"{values['ms']:.1f} ms a frame, median of {values['timed_frames']} (composite "
+        f"{values['ms']:.1f} ms {what}, median of {values['timed_frames']} (composite "
         f"{values['composite_ms']:.1f}, upload {values['upload_ms']:.1f}, warp {values['warp_ms']:.1f}; "
         f"{values['warp']} warp)"
     )
@@ -272,6 +276,8 @@ def _print(values: dict[str, Any]) -> None:
     if "separate_ms" in values:
         ms, ratio = values["separate_ms"], values["separate_ratio"]
         rows["separately"] = f"{ms:.1f} ms, each picture by itself: {ratio:.1f} × as long"
+    if values.get("missed_frames"):
+        rows["missed"] = f"{values['missed_frames']} refreshes"
     if values.get("outside_frames"):
         rows["outside"] = f"an eye was outside the walls in {values['outside_frames']} frames"
     for picture in values.get("pictures", []):

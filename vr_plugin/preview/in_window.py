@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 _FRAMES_FOR_A_RATE = 3
 _REST_SECONDS = 0.25  # how long nothing happens before we look again whether something did
 _REFINING_SECONDS = 0.01  # how long before we look again whether a better picture is finished
+# Longer than any encoding: two threads must not work with one renderer.
+_ENCODING_SECONDS = 600.0
 _log = logging.getLogger("persp_sw")
 
 
@@ -229,10 +231,10 @@ class PreviewLoop:
         return self.pictures.composite(wanted, cancel, resting=True)
 
     def _give_up_refining(self) -> None:
-        """At once: compositing looks whether it is cancelled many times a frame."""
+        """At once, for compositing often looks whether it is cancelled; encoding is waited for."""
         refiner, self._refiner = self._refiner, None
         if refiner is not None:
-            refiner.close()
+            refiner.close(_ENCODING_SECONDS)
 
     def _show(
         self, wanted: Wanted, done: Composited, *, begin: float | None = None, is_new: bool = True

@@ -99,14 +99,19 @@ class PreviewPictures:
         self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
         self._transfer_of, self._preset = transfer_of, preset
         self._canvases: dict[str, psw.Canvas] = {}
-        aim = QualityAim() if rig is None else rig.quality
-        self._inside = _steady(FrameMaker(renderer, (), np.eye(4)), aim, target_hz)
-        self.target_hz = target_hz if self._inside.controller else 0.0
+        self._base = renderer.settings
+        self._window = FrameMaker(renderer, (), np.eye(4))
+        self._makers = [self._window]
         if rig is not None:
             walls = [replace(wall, wall=_smaller(wall.wall)) for wall in rig.walls]
             self._room = FrameMaker(renderer, walls, room_from_world)
             self._visitor = FrameMaker(renderer, (), room_from_world)
-            self._outside = _steady(self._room, aim, target_hz)
+            self._makers.append(self._room)
+        self.target_hz = target_hz
+        self._steadies: dict[FrameMaker, Steady] = {}
+        self._make_steady()
+        if self._steadies[self._window].controller is None:
+            self.target_hz = 0.0
 
     def composite(
         self, wanted: Wanted, cancel: psw.Cancel | None = None, resting: bool = False
@@ -204,18 +209,28 @@ class PreviewPictures:
         return self.renderer.warp(image, view, canvas)
 
     def _steady(self, wanted: Wanted) -> Steady:
-        return self._outside if wanted.outside else self._inside
+        return self._steadies[self._room if wanted.outside else self._window]
 
     def _set_up(self, wanted: Wanted) -> Steady:
-        steady = self._steady(wanted)
-        if wanted.quality is None and steady.held is not None:
-            steady.release()
-        elif wanted.quality != steady.held:
-            steady.hold(wanted.quality)
         if wanted.preset != self._preset:
             self._preset = wanted.preset
             self.renderer.transfer = self._transfer_of(wanted.preset)
+            self._make_steady()  # another function, another ladder
+        steady = self._steady(wanted)
+        steady.held = wanted.quality
         return steady
+
+    def _make_steady(self) -> None:
+        """Frames in their time, of either view, by the ladder of the transfer function that is."""
+        aim = QualityAim() if self.rig is None else self.rig.quality
+        rate_hz, ladder = self.target_hz, None
+        for maker in self._makers:
+            controller = controller_for(self.renderer, aim, rate_hz, ladder) if rate_hz else None
+            self._steadies[maker] = steady = Steady(maker, controller)
+            steady.base = self._base
+            if controller is not None:
+                ladder = controller.ladder
+                steady.refinement = psw.Refinement(ladder)
 
     def _moment(self, wanted: Wanted) -> Moment:
         mode = wanted.stereo.shown_mode
@@ -223,7 +238,7 @@ class PreviewPictures:
             wall = wanted.camera.wall(wanted.size)
             pixels = eye_size(mode, wanted.size)
             wall = psw.Wall(wall.lower_left, wall.lower_right, wall.upper_left, pixels, "view")
-            maker = self._inside.maker
+            maker = self._window
             maker.walls = (RigWall(wall, mode),)
             eyes = wanted.eyes
             if mode == "mono":
@@ -238,13 +253,6 @@ class PreviewPictures:
         self._visitor.walls = (RigWall(wanted.camera.wall(wanted.size)),)
         (seen,) = self._visitor.moment(Pose(), _one_eye(wanted.camera.position)).sights.values()
         return replace(moment, sights={**moment.sights, _VISITOR: seen})
-
-
-def _steady(maker: FrameMaker, aim: QualityAim, target_hz: float) -> Steady:
-    controller = controller_for(maker.renderer, aim, target_hz) if target_hz else None
-    steady = Steady(maker, controller)
-    steady.refinement = psw.Refinement(controller.ladder) if controller else None
-    return steady
 
 
 def _one_eye(position: np.ndarray) -> EyePair:
