@@ -35,6 +35,10 @@ _OWN = {
         "Measure time, work, memory and error, beside other renderers.",
     ),
     "chart": ("persp_sw.commands.chart:chart", "Draw time against accuracy, for all ways to sample."),
+    "atlas": (
+        "persp_sw.commands.atlas:atlas",
+        "Measure the ways in which volume renderers fail, beside their bounds.",
+    ),
     "trace": ("persp_sw.commands.trace:trace", "Tell how steady a recorded session was, and draw it."),
     "papers": (
         "persp_sw.commands.papers:papers",

@@ -44,7 +44,9 @@ def test_help_teaches_and_lists_all_commands():
         assert word in result.stdout
 
 
-@pytest.mark.parametrize("command", ["info", "render", "demo", "bench", "chart", "trace", "papers", "warmup"])
+@pytest.mark.parametrize(
+    "command", ["info", "render", "demo", "bench", "chart", "atlas", "trace", "papers", "warmup"]
+)
 def test_each_command_has_examples(command):
     result = run(command, "--help")
     assert result.exit_code == 0
@@ -56,7 +58,7 @@ def test_help_loads_neither_numba_nor_readers():
     code = (
         "import sys\n"
         "from persp_sw.cli import main\n"
-        "commands = ('info', 'render', 'demo', 'bench', 'chart', 'trace', 'papers', 'warmup')\n"
+        "commands = ('info', 'render', 'demo', 'bench', 'chart', 'atlas', 'trace', 'papers', 'warmup')\n"
         "for arguments in (['--help'], *([name, '--help'] for name in commands)):\n"
         "    try: main(arguments)\n"
         "    except SystemExit: pass\n"

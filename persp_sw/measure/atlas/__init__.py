@@ -1,0 +1,1 @@
+"""The stability atlas: the ways in which volume renderers fail, as cases that measure ours beside bounds."""
