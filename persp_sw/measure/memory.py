@@ -1,4 +1,4 @@
-"""Peak memory of the process, of a stretch of work where the system can tell."""
+"""Memory of the process: at present, and its peak, of a stretch of work where the system can tell."""
 
 from __future__ import annotations
 
@@ -20,11 +20,24 @@ def restart_peak() -> bool:
 
 def peak_bytes() -> int:
     """Largest resident size of the process, libraries and volume included, since `restart_peak`."""
+    return _status("VmHWM") or _usage()
+
+
+def resident_bytes() -> int:
+    """Resident size of the process now; where the system does not say, the largest since its start."""
+    return _status("VmRSS") or _usage()
+
+
+def _status(name: str) -> int | None:
     try:
         for line in _STATUS.read_text().splitlines():
-            if line.startswith("VmHWM:"):
+            if line.startswith(f"{name}:"):
                 return 1024 * int(line.split()[1])
     except OSError:
         pass
+    return None
+
+
+def _usage() -> int:
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
