@@ -180,7 +180,7 @@ def test_the_tables_have_the_papers_layout(tiny: Path):
     assert "a look, not its experiments" in text
     assert "made up" not in text
     curve = text[places[0] : places[1]]
-    assert curve.count("█" * 32) == 1  # the longest time
+    assert curve.count("█" * 32) >= 1  # the longest time; in a noisy run another may round to it
     for quoted in (printed.FIGURE5["words"], printed.CUBE["words"]):
         assert quoted in " ".join(text.split())
 
