@@ -25,7 +25,6 @@ from .kernels.scanline import Level
 from .optics.classification import Classification
 from .planning import EyePlan
 from .sampling import Sampling, choose_sampling
-from .seams import close_seams
 from .settings import Settings
 from .slabs import in_slabs, placed
 from .volume.detail import DetailStore
@@ -57,9 +56,8 @@ def composite_eye(
     eye, geometry, faces = plan.eye, plan.geometry, plan.faces(settings)
     pixels = np.zeros((sum(face.size[0] * face.size[1] for face in faces), 4), np.float32)
     threads = settings.threads or _jit.max_threads()
-    image = EyeImage(
-        eye, pose, tuple(faces), pixels, 0, np.array([geometry.low, geometry.high]), regions.planes(volume)
-    )
+    box, half_spaces = np.array([geometry.low, geometry.high]), regions.planes(volume)
+    image = EyeImage(eye, pose, tuple(faces), pixels, 0, box, half_spaces)
     images = [image.face_pixels(number) for number in range(len(faces))]
     sampling = choose_sampling(settings, classification, volume)
     level = cache(partial(_level, detail))  # zones, opposite faces and steps of depth have them in common
@@ -68,8 +66,8 @@ def composite_eye(
         limits = nearest, farthest
         return sum(
             _composite(
-                detail, level, classification, part, settings, sampling, eye, geometry.eye, face, threads,
-                limits, cancel, out,
+                detail, level, classification, part, settings, sampling, eye, geometry.eye, face,
+                plan.own_rays, threads, limits, cancel, out,
             )
             for face, out in zip(faces, images, strict=True)
             for part in plan.parts
@@ -80,7 +78,6 @@ def composite_eye(
             return in_slabs(image, settings.depth_slabs, settings.residual, between)
         image = placed(image, between)
     samples = between(faces, images, 0.0, np.inf)
-    close_seams(faces, images)
     return replace(image, samples=image.samples + samples)
 
 
@@ -94,6 +91,7 @@ def _composite(
     eye: Eye,
     eye_object: NDArray[np.float64],
     face: Face,
+    own_rays: bool,
     threads: int,
     distances: tuple[float, float],
     cancel: Cancel,
@@ -104,7 +102,8 @@ def _composite(
     axes = list(STANDARD_AXES[face.axis])
     linear = volume.world_from_object[:3, axes]
     least, preintegrated = sampling
-    per_interval = face.samples_per_interval(least)
+    # Beyond own rays there are spare pixels only, which fill packets.
+    per_interval = least if own_rays else face.samples_per_interval(least)
     low, high = part.low[axes], part.high[axes]
     (o_i, o_j), offset_pitch, (t_i, t_j), pitch, k_0 = face.rays(eye_object[axes])
     if eye.is_at_infinity and face.sign < 0:  # distances count from the last slice, which is in front

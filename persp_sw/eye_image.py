@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .arrays import Image, Matrix
 from .errors import ViewError
 from .geometry.faces import Face
+from .geometry.seams import reach_of
 from .geometry.view import Eye
 from .volume.levels import STANDARD_AXES
 
@@ -56,6 +57,11 @@ class EyeImage:
     half_spaces: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
     depth: float | None = None
     slabs: tuple[EyeImage, ...] = ()
+
+    @property
+    def alone(self) -> float:
+        """c of the seams: how far towards a seam a face shows rays alone."""
+        return 1 / reach_of(self.faces[0].pitch) if self.faces else 1.0
 
     def offset(self, number: int) -> int:
         """Where face `number` begins in `pixels`."""

@@ -27,7 +27,7 @@ class EyePlan:
     eye, walls
         Whose plan it is.
     previous
-        Faces of this eye's frame before, which are kept where they serve about as well.
+        Faces of this eye's frame before: parallel rays keep their axis where it serves about as well.
     geometry
         The eye, its walls and the box of all that can be seen, object space.
     parts
@@ -56,6 +56,11 @@ class EyePlan:
             and self.single_face_tangent == settings.single_face_tangent
         )
 
+    @property
+    def own_rays(self) -> bool:
+        """Whether each face shows the rays along its own axis alone, of which none is steep."""
+        return all(need.own_rays for need in self.needs)
+
     def faces(self, settings: Settings) -> list[Face]:
         """The faces at the settings' quality or size."""
         return faces_for(
@@ -63,7 +68,6 @@ class EyePlan:
             quality=settings.quality,
             max_size=settings.max_intermediate,
             intermediate_size=settings.intermediate_size,
-            previous=self.previous,
         )
 
 
@@ -80,7 +84,15 @@ def plan_eye(
     eye_object = object_from_world[:3] @ (*eye.position, eye.w)
     parts, low, high = _seen_parts(store, regions, eye_object, eye.w)
     views = [View(eye, wall) for wall in walls] if parts else []
-    geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
+    geometry = EyeGeometry(
+        eye_object,
+        low,
+        high,
+        views,
+        object_from_world,
+        eye.near,
+        eye.is_at_infinity,
+    )
     limit = settings.single_face_tangent
     return EyePlan(
         eye,

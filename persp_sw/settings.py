@@ -27,7 +27,8 @@ class Settings:
     residual
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent
-        One face of the eye image serves while no ray is steeper against it than this tangent, 1 … 8.
+        1: each ray is sampled along its own axis, so that no axis switch pops. Above, to 8: one face of the
+        eye image serves while no ray is steeper against it than this tangent; at the same cost, and it pops.
     level_of_detail
         Take coarser voxels where pixels are more than some 2.4 voxels apart, which would alias and cost more.
     skip_empty
@@ -58,7 +59,7 @@ class Settings:
     samples_per_interval: int | None = None
     preintegrated: bool | None = None
     residual: float = 0.005
-    single_face_tangent: float = 3.0
+    single_face_tangent: float = 1.0
     level_of_detail: bool = True
     skip_empty: bool = True
     pack_runs: bool = True

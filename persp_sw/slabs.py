@@ -25,7 +25,6 @@ from .eye_image import EyeImage
 from .geometry.faces import Face
 from .geometry.placement import box_between, depth_range
 from .kernels.state import TILE
-from .seams import close_seams
 
 Array = NDArray[np.float64]
 
@@ -139,7 +138,6 @@ def in_slabs(image: EyeImage, count: int, residual: float, composite: Composite)
         samples += composite(image.faces, images, near, far)
         for pixels, where in zip(images, hidden, strict=True):
             pixels[where] = 0
-        close_seams(image.faces, images)
         whole += (1 - whole[:, 3:]) * slab.pixels
         slabs.append(slab)
     depth = profile.depths(profile.cuts(1))[0]

@@ -28,7 +28,6 @@ RANKS = {
     "persp_sw.eye_image": 3,
     "persp_sw.planning": 3,
     "persp_sw.sampling": 3,
-    "persp_sw.seams": 3,
     "persp_sw.slabs": 3,
     "persp_sw.compositor": 3,
     "persp_sw.warp": 3,

@@ -32,8 +32,9 @@ def test_planned_samples_and_pixels_are_those_taken(position):
     assert planned.pixels == sum(len(image.pixels) for image in images)
     assert planned.faces == sum(len(image.faces) for image in images)
     taken = sum(image.samples for image in images)
-    # A packet of 16 pixels that meets the box is sampled throughout, a steep one twice an interval.
-    assert 0.5 * taken <= planned.samples <= 1.1 * taken
+    # A packet of 16 pixels that meets the box is sampled throughout, a steep one twice an interval; faces of
+    # an eye inside are 40 pixels wide and take 64.
+    assert 0.4 * taken <= planned.samples <= 1.1 * taken
 
 
 def test_planned_samples_grow_as_those_taken_do():

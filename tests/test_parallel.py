@@ -39,7 +39,7 @@ def plan(volume, *views, quality=1.0, previous=()):
     inverse = np.linalg.inv(volume.world_from_object)
     eye = inverse[:3] @ (*views[0].eye.position, 0)
     geometry = EyeGeometry(eye, np.zeros(3), np.array(volume.size) - 1.0, views, inverse, 0.0, True)
-    return faces_for(needs_of(geometry, 3, previous), quality=quality, max_size=4096, previous=previous)
+    return faces_for(needs_of(geometry, 3, previous), quality=quality, max_size=4096)
 
 
 def poses(rng):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from moved_eyes import SOLID, coloured_noise, composited, moved
-from tolerances import WARP_LINEAR
+from tolerances import FLOAT32_IMAGE, WARP_LINEAR
 from views import DIRECTIONS, random_pose, random_rotation, view_of
 
 from persp_sw import Eye, View, Volume, Wall
@@ -84,10 +84,12 @@ def test_every_pixel_looks_where_its_ray_meets_the_images_plane(volume, rng, dis
             along = face.sign * points[:, k]
             aside = np.abs(points[:, [i, j]]).max(-1)
             own = along >= aside if len(image.faces) > 1 else along > 0
-            unsure |= np.abs(along - aside) < 1e-9 * aside if len(image.faces) > 1 else False
+            # Near a seam two faces tell their tangents; how near, differs from face to face for a moved eye.
+            unsure |= np.abs(along - aside) < 0.3 * aside if len(image.faces) > 1 else False
             expected[own] = np.column_stack(
                 [points[own][:, [i, j]] / along[own, None], np.full((own.sum(), 2), (face.axis, face.sign))]
             )
+        assert (~unsure).sum() > 100
         assert np.abs(picture[shown] - expected)[~unsure].max() < WARP_LINEAR
     assert max(counts) == faces
 
@@ -95,10 +97,10 @@ def test_every_pixel_looks_where_its_ray_meets_the_images_plane(volume, rng, dis
 def own_rays(image, view):
     """What the kernel needs for the image's own eye: rays' directions are tangents, at no distance."""
     directions = np.linalg.inv(image.world_from_object)[:3, :3] @ view.direction_from_pixel
-    matrices, borders = [], []
+    matrices, borders, c = [], [], image.alone
     for face in image.faces:
         i, j, along = directions[list(STANDARD_AXES[face.axis])] * np.array([[1], [1], [face.sign]])
-        borders.append([along - i, along + i, along - j, along + j])
+        borders.append([along - c * i, along + c * i, along - c * j, along + c * j])
         (t_i, t_j), p = face.origin, face.pitch
         to_pixels = np.array([[1 / p, 0, -t_i / p - 0.5], [0, 1 / p, -t_j / p - 0.5], [0, 0, 1]])
         matrices.append(to_pixels @ np.array([i, j, along]))
@@ -144,7 +146,8 @@ def test_from_inside_a_moved_eye_sees_all_around(rng):
         shift = random_rotation(rng)[0] * size
         around_moved = around(eye + shift, random_rotation(rng))
         for wall in around_moved:
-            assert (warp_eye_image(image, View(Eye(eye + shift), wall)) == constant).all()
+            picture = warp_eye_image(image, View(Eye(eye + shift), wall))
+            assert np.abs(picture - constant).max() < FLOAT32_IMAGE
 
 
 def test_inside_a_solid_box_a_moved_eye_sees_no_crack(rng):

@@ -424,7 +424,7 @@ def test_an_eye_that_moved_sees_a_plane_in_the_volume(warp, volume):
         picture = drawn(lambda m=moved: warp.draw_view(m), (200, 150))[..., 3]
         rows, columns = np.indices(picture.shape) + 0.5
         centroid = np.array([(columns * picture).sum(), (rows * picture).sum()]) / picture.sum()
-        assert np.abs(centroid - moved.project(point)).max() < 0.05  # of a tent some 5 pixels wide
+        assert np.abs(centroid - moved.project(point)).max() < 0.06  # of a tent some 5 pixels wide
 
 
 @pytest.mark.parametrize(

@@ -208,20 +208,27 @@ def seen_colour(rows, depth):
     return taken @ rows[:, :3] / taken.sum()
 
 
-def warp_pixel(direction, faces):
-    """Bilinear look-up of an object-space direction; `faces`: list of (axes, sign, origin, pitch, image)."""
-    owner = max(faces, key=lambda f: f[1] * direction[f[0][2]]) if len(faces) > 1 else faces[0]
-    (i, j, k), sign, origin, pitch, image = owner
-    along = sign * direction[k]
-    if along <= 0 or (len(faces) > 1 and along < np.abs(direction).max()):
-        return np.zeros(4)
-    u, v = (np.array([direction[i], direction[j]]) / along - origin) / pitch - 0.5
-    height, width = image.shape[:2]
-    if not (0 <= u <= width - 1 and 0 <= v <= height - 1):
-        return np.zeros(4)
-    left, top = min(int(u), width - 2), min(int(v), height - 2)
-    weights = np.outer([1 - (v - top), v - top], [1 - (u - left), u - left])
-    return np.einsum("yx,yxc->c", weights, image[top : top + 2, left : left + 2].astype(float))
+def warp_pixel(direction, faces, alone):
+    """An object-space direction looked up in `faces`: list of (axes, sign, origin, pitch, image).
+
+    A single one shows all rays. Each of several counts by how much of the largest component is along its own
+    axis, beyond the share `alone`.
+    """
+    total, counted = np.zeros(4), 0.0
+    for (i, j, k), sign, origin, pitch, image in faces:
+        along = sign * direction[k]
+        count = 1.0 if len(faces) == 1 else along / np.abs(direction).max() - alone
+        if along <= 0 or count <= 0:
+            continue
+        u, v = (np.array([direction[i], direction[j]]) / along - origin) / pitch - 0.5
+        height, width = image.shape[:2]
+        if not (0 <= u <= width - 1 and 0 <= v <= height - 1):
+            continue
+        left, top = min(int(u), width - 2), min(int(v), height - 2)
+        weights = np.outer([1 - (v - top), v - top], [1 - (u - left), u - left])
+        total += count * np.einsum("yx,yxc->c", weights, image[top : top + 2, left : left + 2].astype(float))
+        counted += count
+    return total / counted if counted else total
 
 
 def clip_polygon(polygon, normals):
@@ -240,13 +247,15 @@ def clip_polygon(polygon, normals):
     return polygon
 
 
-def pyramid_normals(axis, sign):
-    """Inward normals of the rays whose largest component is `sign` along `axis`."""
-    normals = np.zeros((4, 3))
-    normals[:, axis] = sign
-    normals[:2, (axis + 1) % 3] = -1, 1
-    normals[2:, (axis + 2) % 3] = -1, 1
-    return normals
+def pyramid_normals(axis, sign, reach):
+    """Inward normals of the rays with tangents up to `reach` in a direction, `sign` along `axis`."""
+    normals = []
+    for other in ((axis + 1) % 3, (axis + 2) % 3):
+        for towards in (-1, 1):
+            normal = np.zeros(3)
+            normal[axis], normal[other] = sign * reach, towards
+            normals.append(normal)
+    return np.array(normals)
 
 
 def seen_corners(sides, matrix, size):
@@ -258,8 +267,11 @@ def seen_corners(sides, matrix, size):
     return [part for side in sides if len(part := clip_polygon(side, normals))]
 
 
-def pixel_sizes(matrix, size, low, high, axis, sign, own, grid, step=1e-6):
-    """∂t/∂pixel's smaller singular value, by differences, at each of a grid's pixels that shows the box."""
+def pixel_sizes(matrix, size, low, high, axis, sign, reach, grid, step=1e-6):
+    """∂t/∂pixel's smaller singular value, by differences, and weight of a grid's pixels that show the box.
+
+    `reach`: up to which tangents the direction's own rays fade; None: all rays are shown.
+    """
     others = [(axis + 1) % 3, (axis + 2) % 3]
     result = []
     for v, u in np.ndindex(grid, grid):
@@ -267,11 +279,21 @@ def pixel_sizes(matrix, size, low, high, axis, sign, own, grid, step=1e-6):
         ray = matrix @ pixel
         along = sign * ray[axis]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ends = np.sort([low / ray, high / ray], axis=0)
-        met = max(ends[0].max(), 0) <= ends[1].min()
-        if along <= 0 or not met or (own and along < np.abs(ray).max()):
+            planes = np.sort([low / ray, high / ray], axis=0)
+        near, far = max(planes[0].max(), 0), planes[1].min()
+        weight = 1 - near / far if near < far else 0
+        if reach is not None:
+            weight *= max(along / np.abs(ray).max() - 1 / reach, 0)
+        if along <= 0 or weight == 0:
             continue
         moved = [matrix @ (pixel + step * delta) for delta in np.eye(3)[:2]]
         columns = [(m[others] / (sign * m[axis]) - ray[others] / along) / step for m in moved]
-        result.append(np.linalg.svd(np.array(columns).T, compute_uv=False)[-1])
+        result.append((np.linalg.svd(np.array(columns).T, compute_uv=False)[-1], weight))
     return result
+
+
+def weighted_quantile(pairs, quantile):
+    """Of (value, weight) pairs, linear between the middles of their weights."""
+    values, weights = np.array(sorted(pairs)).T
+    passed = np.cumsum(weights) - weights / 2
+    return np.interp(quantile * weights.sum(), passed, values)

@@ -147,7 +147,6 @@ class FrameMaker:
         self._walls = tuple(walls)
         self.room_from_world = room_from_world
         self._depths = KeptDepths(renderer)
-        self._previous: dict[str, psw.EyeImage] = {}
         self._said: set[str] = set()
 
     @property
@@ -218,10 +217,7 @@ class FrameMaker:
 
     def plan(self, moment: Moment) -> dict[str, psw.EyePlan]:
         """What compositing a moment will ask for, by the eye's name."""
-        return {
-            name: self.renderer.plan(sight.eye, sight.walls, self._previous.get(name))
-            for name, sight in moment.sights.items()
-        }
+        return {name: self.renderer.plan(sight.eye, sight.walls) for name, sight in moment.sights.items()}
 
     def composite(
         self, moment: Moment, cancel: psw.Cancel | None = None, plans: Mapping[str, psw.EyePlan] | None = None
@@ -236,13 +232,11 @@ class FrameMaker:
         images, statistics = {}, {}
         for name, sight in moment.sights.items():
             if plans is None:
-                before = self._previous.get(name)
-                make = partial(self.renderer.composite, sight.eye, sight.walls, before, cancel)
+                make = partial(self.renderer.composite, sight.eye, sight.walls, cancel=cancel)
             else:
                 make = partial(self.renderer.composite_plan, plans[name], cancel)
             images[name] = self._depths.composite(name, sight.eye, make)
             statistics[name] = dict(self.renderer.last)
-        self._previous.update(images)
         return Frame(moment, pictures_of(moment, images), images, statistics)
 
     def _in_world(self, wall: RigWall, margin: float, head: Pose) -> psw.Wall:

@@ -15,17 +15,14 @@ from numpy.typing import NDArray
 from ..kernels.scanline import STEEP
 from ..kernels.state import TILE
 from .parallel import Shear
-from .sight import EyeGeometry, Sight, Sights
+from .seams import REACH, reach_of
+from .sight import EyeGeometry, Sight, Sights, seen_volume
 
 # Rays this far (pixels) beyond the last pixel's centre are still found.
 _GUARD = 1e-6
 # A rectangle of n pitches takes up to n + 3 pixels, whatever its position against the pixels.
 _EXTRA = 3
-# Where the box begins nearer than this part of the distance at which it ends, one face, which has no seam,
-# may take so many times the work of several. (At a tangent of 2 it takes 15.2 instead of 8.4 M samples.)
-_CLOSE = 1 / 8
-_WORTH = 1.5
-# What a previous frame chose stays while nothing is better by this factor.
+# The axis of parallel rays, once chosen, stays while no other is better by this factor.
 _STAY = 1.1
 
 
@@ -87,93 +84,99 @@ class Face:
 def needs_of(geometry: EyeGeometry, single_face_tangent: float, previous: Sequence[Face] = ()) -> list[Need]:
     """What the faces must cover that hold a ray which meets the box and some wall's frustum.
 
-    One face serves while no such ray has a tangent beyond `single_face_tangent` in it, and while it takes not
-    much more work, if the eye is close or inside, than several would; else several do, each limited to its
-    own rays (largest |component|). The eye may be anywhere: outside, on a side, inside.
+    Each ray is shown by the face whose own it is, see `seams`, and near one by both. So as an eye moves rays
+    change faces one after the other, and the picture never does all at once. With a `single_face_tangent`
+    above 1, one face shows all rays while none has a tangent beyond that in it. The eye may be anywhere:
+    outside, on a side, inside.
 
-    `previous` are the faces of the frame before, which are kept a little beyond the point where others would
-    be chosen, so that an eye at rest on that point does not make the picture flicker.
+    `previous`, the faces of the frame before, matters to parallel rays only: all of them change their axis at
+    once, and an eye at rest between two should not make the picture flicker.
     """
     if not geometry.views:
         return []
     if geometry.at_infinity:
         return _parallel_needs(geometry, previous)
-    return _needs(geometry, single_face_tangent, previous)
+    sights = Sights.of(geometry, REACH)
+    single = _single_face(sights, single_face_tangent) if single_face_tangent > 1 else None
+    return _needs_of_sights(geometry, sights, single)
 
 
 def faces_for(
-    needs: Sequence[Need],
-    *,
-    quality: float,
-    max_size: int,
-    intermediate_size: int | None = None,
-    previous: Sequence[Face] = (),
+    needs: Sequence[Need], *, quality: float, max_size: int, intermediate_size: int | None = None
 ) -> list[Face]:
-    """The faces that cover the needs.
+    """The faces that cover the needs, of one pitch, which changes no faster than the view does.
 
     Pixel centres lie at odd multiples of half the pitch. So a picture keeps its rays when its rectangle grows
-    by a pixel, none of them lies in a slice or a side, where nobody can decide, and where several faces meet,
-    at a tangent of ±1, both have pixels on the same rays: they share one pitch, 2 over an odd number.
+    by a pixel, and none of them lies in a slice or a side, where nobody can decide.
 
     `intermediate_size` replaces `quality`: the largest face gets so many pixels on its longer side, or up to
-    four less, its width rounded up to a packet's 16. `previous`: as `needs_of`'s; their pitch is kept, too.
+    four less, its width rounded up to a packet's 16.
     """
     if not needs:
         return []
-    longest = max(need.longest for need in needs)
     most = max_size // TILE * TILE
     if intermediate_size:
         most = min(most, -(-intermediate_size // TILE) * TILE)
-        pitch = longest / (intermediate_size - _EXTRA) or 1.0
+        pitch = _pitch_of_size(needs, intermediate_size - _EXTRA)
     else:
         # The width is a multiple of a packet's 16 pixels anyway: use it, so that a small picture is not made
         # of its own margins.
         pitch = _common_pitch(needs) / quality
-        pitch = min(pitch, longest / (TILE - _EXTRA) or pitch)
-    pitch = max(pitch, longest / (most - _EXTRA))
-    if len(needs) > 1:
-        pitch = _seam_pitch(pitch, longest, most, previous, exact=bool(intermediate_size))
-    return [need.face(pitch, most) for need in needs]
+        pitch = min(pitch, _pitch_of_size(needs, TILE - _EXTRA) or pitch)
+    pitch = max(pitch, _pitch_of_size(needs, most - _EXTRA)) or 1.0
+    faces = [need.face(pitch, most) for need in needs]
+    return [face for face in faces if face is not None]
 
 
 @dataclass(frozen=True, eq=False)
 class Need:
-    """What one face must cover: a rectangle of tangents (of voxels, for an eye at infinity)."""
+    """What one face must cover: a rectangle of tangents (of voxels, for an eye at infinity).
+
+    One of `own_rays` alone shows what is near its seams, too; how near, depends on the pitch.
+    """
 
     axis: int
     sign: int
     low: NDArray[np.float64]
     high: NDArray[np.float64]
-    depth: float  # slices, at most
+    work: float  # samples, if all is seen, times pitch²
     pitch: float  # that the volume and the walls ask for
+    own_rays: bool = False
     parallel: tuple[float, float] | None = None
 
-    @property
-    def longest(self) -> float:
-        """The rectangle's longer side."""
-        return float((self.high - self.low).max())
+    def longest(self, reach: float) -> float:
+        """The longer side of what there is up to tangents of `reach`; 0 where there is nothing."""
+        low, high = self._within(reach)
+        return float(max((high - low).max(), 0.0))
 
-    @property
-    def work(self) -> float:
-        """Samples that its own pitch takes, if all is seen."""
-        return float(max(np.prod(self.high - self.low), 1e-6) * self.depth / self.pitch**2)
-
-    def face(self, pitch: float, most: int) -> Face:
+    def face(self, pitch: float, most: int) -> Face | None:
         """The pixels that the warp's bilinear look-up needs, in whole packets, at most `most` in a row.
 
-        Packets begin at multiples of 16 pixels from 0, where there is room, so that a pixel stays in its
-        packet, whose steepest ray decides how many samples it takes, when the rectangle grows.
+        None where all lies beyond the zone of the seam in which another face shows it, too.
+
+        Where rays may be steep, packets begin at multiples of 16 pixels from 0, if there is room, so that a
+        pixel stays in its packet, whose steepest ray decides how many samples it takes, when the rectangle
+        grows. Where none is, spare pixels lie where the box ends rather than behind a seam: there they are
+        empty and cost nothing. (Faces of 30 pixels, from a corner: 62,000 samples instead of 81,000.)
         """
-        first = np.floor(self.low / pitch - 0.5 - _GUARD)
-        end = np.ceil(self.high / pitch + 0.5 + _GUARD)
+        low, high = self._within(reach_of(pitch))
+        if (low > high).any():
+            return None
+        first = np.floor(low / pitch - 0.5 - _GUARD)
+        end = np.ceil(high / pitch + 0.5 + _GUARD)
         begin = first[0] // TILE * TILE
         width = -(-end[0] // TILE) * TILE - begin
-        if width > most:
-            begin = first[0]
-            width = -(-(end[0] - begin) // TILE) * TILE
+        if self.own_rays or width > most:
+            width = -(-(end[0] - first[0]) // TILE) * TILE
+            begin = end[0] - width if high[0] < self.high[0] else first[0]
         origin = float(begin * pitch), float(first[1] * pitch)
         size = int(width), int(end[1] - first[1])
         return Face(self.axis, self.sign, origin, float(pitch), size, self.parallel)
+
+    def _within(self, reach: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        if not self.own_rays:
+            return self.low, self.high
+        return np.maximum(self.low, -reach), np.minimum(self.high, reach)
 
 
 def _parallel_needs(geometry: EyeGeometry, previous: Sequence[Face]) -> list[Need]:
@@ -184,25 +187,7 @@ def _parallel_needs(geometry: EyeGeometry, previous: Sequence[Face]) -> list[Nee
     if sight is None:
         return []
     pitch = max(1.0, min(shear.pixel_size(geometry, view) for view in geometry.views))  # a pixel a voxel
-    depth = geometry.high[shear.axis] - geometry.low[shear.axis]
-    return [Need(shear.axis, shear.sign, sight.low, sight.high, depth, pitch, shear.tangents)]
-
-
-def _needs(geometry: EyeGeometry, limit: float, previous: Sequence[Face]) -> list[Need]:
-    """One need if one face can serve, else one for every pyramid that sees something.
-
-    Close by and inside, where a rectangle is filled with what is seen, one face must not take much more work.
-    """
-    sights = Sights.of(geometry)
-    single = _single_face(sights, limit, previous)
-    one = [] if single is None else _needs_of_sights(geometry, sights, single)
-    if one and not (geometry.inside or sights.whole(single).nearest < _CLOSE * one[0].depth):
-        return one
-    several = _needs_of_sights(geometry, sights, None)
-    worth = _WORTH * (_STAY if len(previous) == 1 else 1 / _STAY if previous else 1)
-    if one and one[0].work <= worth * sum(need.work for need in several):
-        return one
-    return several
+    return [Need(shear.axis, shear.sign, sight.low, sight.high, 1.0, pitch, parallel=shear.tangents)]
 
 
 def _needs_of_sights(geometry: EyeGeometry, sights: Sights, only: int | None) -> list[Need]:
@@ -213,17 +198,18 @@ def _needs_of_sights(geometry: EyeGeometry, sights: Sights, only: int | None) ->
     else:
         shown = {only: sights.whole(only)}
     return [
-        _need(geometry, direction, sight, 1.0 if only is None else np.inf, pixels[direction])
+        _need(geometry, direction, sight, only is None, pixels[direction])
         for direction, sight in shown.items()
         if sight is not None
     ]
 
 
-def _need(geometry: EyeGeometry, direction: int, sight: Sight, limit: float, pixel: float) -> Need:
-    """What a face must cover that holds the rays of a sight, as far as their tangents are below `limit`."""
-    low, high = np.clip(sight.low, -limit, limit), np.clip(sight.high, -limit, limit)
+def _need(geometry: EyeGeometry, direction: int, sight: Sight, own_rays: bool, pixel: float) -> Need:
+    """What a face must cover that holds the rays of a sight."""
     pitch = max(_volume_pitch(geometry, sight), pixel)
-    return Need(direction // 2, 1 if direction % 2 else -1, low, high, sight.farthest, pitch)
+    axis, sign = direction // 2, 1 if direction % 2 else -1
+    _, shown = seen_volume(geometry, axis, sign, sight.low, sight.high)
+    return Need(axis, sign, sight.low, sight.high, float(shown.sum()), pitch, own_rays)
 
 
 def _volume_pitch(geometry: EyeGeometry, sight: Sight) -> float:
@@ -235,45 +221,33 @@ def _volume_pitch(geometry: EyeGeometry, sight: Sight) -> float:
     return float(1 / max(front, geometry.near / sight.steepest, sight.farthest / 2))
 
 
-def _single_face(sights: Sights, limit: float, previous: Sequence[Face]) -> int | None:
-    """The direction in which all is in front of the eye with the smallest largest tangent, if below `limit`.
-
-    After one face, another must be better by a margin; after several, one must be good enough by a margin.
-    """
-    before = [2 * face.axis + (face.sign > 0) for face in previous]
-    if len(before) > 1:
-        limit = max(limit / _STAY, 1.0)
-    best, best_tangent = None, np.inf
+def _single_face(sights: Sights, limit: float) -> int | None:
+    """The direction in which all is before the eye with the smallest largest tangent, if below `limit`."""
+    best, least = None, limit
     for direction in range(6):
         sight = sights.whole(direction)
         if sight is not None and sight.nearest > 0:
             steepest = max(np.abs(sight.low).max(), np.abs(sight.high).max())
-            if steepest <= limit:
-                judged = steepest / _STAY if before == [direction] else steepest
-                if judged <= best_tangent:
-                    best, best_tangent = direction, judged
+            if steepest <= least:
+                best, least = direction, steepest
     return best
 
 
 def _common_pitch(needs: Sequence[Need]) -> float:
-    """One pitch for all faces with the work of each face's own: Σ area · depth / pitch² is the same."""
-    if len(needs) == 1:
-        return needs[0].pitch
-    work = np.array([need.work for need in needs])
-    return float(np.sqrt((work * np.square([need.pitch for need in needs])).sum() / work.sum()))
+    """One pitch for all faces with the samples of each face's own: Σ work / pitch² is the same.
 
-
-def _seam_pitch(pitch: float, longest: float, most: int, previous: Sequence[Face], *, exact: bool) -> float:
-    """A pitch near `pitch` with pixel centres at tangents of ±1: 1 / (n + ½), n = 14, 30, 46 … by choice.
-
-    Then a whole face, |t| ≤ 1 and an apron, fills its packets. Such steps, and the previous frame's pitch if
-    it will do, because another pitch changes all of a picture a little, and an eye that moves slowly should
-    seldom meet one.
+    So a face that comes into view changes it from nothing on, as the eye moves.
     """
-    if exact:
-        return 1 / (int(1 / pitch - 0.5) + 0.5)
-    if len(previous) > 1 and 1 / _STAY < previous[0].pitch / pitch < _STAY:
-        pitch = previous[0].pitch
-    packets = max(round((1 / pitch + 1.5) / TILE), 1)
-    largest = (most - _EXTRA) / longest - 0.5 if longest else np.inf
-    return 1 / (min(TILE * packets - 2, int(largest)) + 0.5)
+    work = np.array([need.work for need in needs])
+    if len(needs) == 1 or not work.any():
+        return min(need.pitch for need in needs)
+    return float(np.sqrt(work.sum() / (work / np.square([need.pitch for need in needs])).sum()))
+
+
+def _pitch_of_size(needs: Sequence[Need], pixels: int) -> float:
+    """At which the longest face has so many pixels; what it shows depends on it. 0 if it has no length."""
+    reach = REACH
+    for _ in range(4):  # each step leaves a part of the error: the zones' of the whole
+        pitch = max(need.longest(reach) for need in needs) / pixels
+        reach = reach_of(pitch)
+    return pitch

@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from ..arrays import Matrix
 from ..kernels import sight
 from ..volume.levels import STANDARD_AXES
+from .seams import REACH
 from .view import View
 
 # Part of a wall's pixels that may be finer than the pitch asked for: at grazing angles a few are 30× finer.
 _QUANTILE = 0.1
+# Pieces of the integral over slices.
+_PIECES = 64
 # Points a side of the grid on which a wall's pixel size is measured.
 _GRID = 24
 # An eye so near to the plane of a side (voxels) is in it.
@@ -66,6 +69,28 @@ class EyeGeometry:
         return bool((self.eye >= self.low - _TOUCHES).all() and (self.eye <= self.high + _TOUCHES).all())
 
 
+def seen_volume(
+    geometry: EyeGeometry, axis: int, sign: int, low: NDArray[np.float64], high: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How much of the box a rectangle of tangents shows, slice by slice, for an eye at a point.
+
+    Returns
+    -------
+    Distances D, (n,), and the rectangle's part, tangents², that shows the box there, times their spacing: the
+    sum is the integral. It has no steps, wherever the eye and whatever the rectangle.
+    """
+    order = list(STANDARD_AXES[axis])
+    nearest, farthest = geometry.low[order] - geometry.eye[order], geometry.high[order] - geometry.eye[order]
+    ends = sorted((sign * nearest[2], sign * farthest[2]))
+    front, back = max(ends[0], 0.0), max(ends[1], 0.0)
+    width = max(back - front, 0.0) / _PIECES
+    distances = front + width * (np.arange(_PIECES) + 0.5)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        begin = np.maximum(nearest[:2] / distances[:, None], low)
+        end = np.minimum(farthest[:2] / distances[:, None], high)
+    return distances, width * np.prod(np.maximum(end - begin, 0.0), axis=1) if width else np.zeros(_PIECES)
+
+
 def tangents(points: NDArray[np.float64], axis: int, sign: int) -> NDArray[np.float64]:
     """(..., 3): tangents t_i, t_j and distance D of directions or of points relative to the eye."""
     i, j, k = STANDARD_AXES[axis]
@@ -108,17 +133,20 @@ class Sights:
         (views, 2) pixels.
     metric
         (3, 3), AᵀA of the linear part A of world_from_object.
+    reach
+        Up to which tangents rays are a direction's own, ≥ 1.
     """
 
-    def __init__(self, sides, matrices, sizes, metric):
+    def __init__(self, sides, matrices, sizes, metric, reach=1.0):
         self.matrices, self.sizes = np.ascontiguousarray(matrices), np.asarray(sizes, np.float64)
         self.bounds = np.empty((len(matrices), 6, 2, sight.BOUND_COLUMNS))
         polygon, spare = np.empty((2, sight.MAX_CORNERS, 3))
         windows = _window_normals(self.matrices, self.sizes)
-        sight.bound_sight(np.ascontiguousarray(sides), windows, metric, polygon, spare, self.bounds)
+        sides = np.ascontiguousarray(sides)
+        sight.bound_sight(sides, windows, metric, reach, polygon, spare, self.bounds)
 
     @classmethod
-    def of(cls, geometry: EyeGeometry) -> Sights:
+    def of(cls, geometry: EyeGeometry, reach: float = 1.0) -> Sights:
         """What an eye at a point sees through its walls."""
         linear = geometry.object_from_world[:3, :3]
         world_from_object = np.linalg.inv(linear)
@@ -128,6 +156,7 @@ class Sights:
             linear @ np.stack([view.direction_from_pixel for view in geometry.views]),
             [view.size for view in geometry.views],
             world_from_object.T @ world_from_object,
+            reach,
         )
 
     def whole(self, direction: int) -> Sight | None:
@@ -135,7 +164,7 @@ class Sights:
         return self._sight(direction, sight.WHOLE)
 
     def own(self, direction: int) -> Sight | None:
-        """What is seen along the rays that are a direction's own: largest component along it."""
+        """What is seen along the rays that are a direction's own, or nearly; None if nothing is."""
         return self._sight(direction, sight.OWN)
 
     def _sight(self, direction: int, which: int) -> Sight | None:
@@ -169,9 +198,10 @@ class Sights:
             geometry.low - geometry.eye,
             geometry.high - geometry.eye,
             -1 if only is None else only,
+            REACH,
             _QUANTILE,
             middles,
-            np.empty((6, _GRID * _GRID)),
+            *np.empty((2, 6, _GRID * _GRID)),
             np.empty(6, np.int64),
             sizes,
         )

@@ -62,7 +62,7 @@ def _include(polygon, count, direction, metric, bounds):
 
 
 @kernel
-def bound_sight(sides, windows, metric, polygon, spare, bounds):
+def bound_sight(sides, windows, metric, reach, polygon, spare, bounds):
     """Bounds, in each of six directions, of what each window shows of some convex polygons.
 
     Parameters
@@ -73,11 +73,13 @@ def bound_sight(sides, windows, metric, polygon, spare, bounds):
         float64 (views, 4, 3): inward normals of the planes through the eye and a wall's edges.
     metric
         float64 (3, 3), AᵀA of the linear part A of world_from_object.
+    reach
+        Up to which tangents rays count as a direction's own, ≥ 1; at 1 each ray is one direction's.
     polygon, spare
         float64 (MAX_CORNERS, 3): scratch.
     bounds
         float64 (views, 6, 2, BOUND_COLUMNS), overwritten, for all that is seen and for the direction's own
-        rays, whose largest component is along it: number of corners before the eye; their least and largest
+        rays: number of corners before the eye; their least and largest
         tangents t_i and t_j; least and largest distance D of all corners; largest world length of a ray
         to a corner, in units of D; sum of the corners before the eye.
     """
@@ -106,29 +108,29 @@ def bound_sight(sides, windows, metric, polygon, spare, bounds):
                 sign = 1.0 if direction % 2 else -1.0
                 for across in range(1, 3):
                     for side in range(2):
-                        towards = 1.0 if side else -1.0
                         c = (k + across) % 3
-                        normal_x = sign if k == 0 else towards if c == 0 else 0.0
-                        normal_y = sign if k == 1 else towards if c == 1 else 0.0
-                        normal_z = sign if k == 2 else towards if c == 2 else 0.0
+                        towards = 1.0 if side else -1.0
+                        normal_x = sign * reach if k == 0 else towards if c == 0 else 0.0
+                        normal_y = sign * reach if k == 1 else towards if c == 1 else 0.0
+                        normal_z = sign * reach if k == 2 else towards if c == 2 else 0.0
                         count = _clip(polygon, count, normal_x, normal_y, normal_z, spare)
                         polygon[:count] = spare[:count]
                 _include(polygon, count, direction, metric, bounds[view, direction, OWN])
 
 
 @kernel
-def _meets(low, high, x, y, z):
-    """Whether the ray from the origin along (x, y, z) meets the box."""
+def _part_in_box(low, high, x, y, z):
+    """How much of the ray from the origin along (x, y, z), up to where it leaves the box, is in it: 0 … 1."""
     near, far = 0.0, np.inf
     for c in range(3):
         along = x if c == 0 else y if c == 1 else z
         if along == 0.0:
             if low[c] > 0.0 or high[c] < 0.0:
-                return False
+                return 0.0
             continue
         one, other = low[c] / along, high[c] / along
         near, far = max(near, min(one, other)), min(far, max(one, other))
-    return near <= far
+    return 1.0 - near / far if near < far else 0.0
 
 
 @kernel
@@ -152,8 +154,29 @@ def _pixel_size(matrix, direction, x, y, z):
 
 
 @kernel
-def measure_pixels(matrices, sizes, low, high, only, quantile, middles, values, counts, out):
+def _quantile(values, weights, quantile):
+    """Of weighted values; linear between the middles of their weights."""
+    order = np.argsort(values)
+    wanted = quantile * weights.sum()
+    passed, before = 0.0, values[order[0]]
+    middle_before = 0.0
+    for at in order:
+        middle = passed + 0.5 * weights[at]
+        if middle >= wanted:
+            if middle <= middle_before:
+                return values[at]
+            part = (wanted - middle_before) / (middle - middle_before)
+            return before + part * (values[at] - before)
+        passed, before, middle_before = passed + weights[at], values[at], middle
+    return before
+
+
+@kernel
+def measure_pixels(matrices, sizes, low, high, only, reach, quantile, middles, values, weights, counts, out):
     """How finely each view shows the box in each direction: a low quantile over a grid of its pixels.
+
+    Pixels count by how much of their ray is in the box, and fade out beyond a direction's own rays: so the
+    quantile has no steps where a pixel of the grid leaves either.
 
     Parameters
     ----------
@@ -164,18 +187,21 @@ def measure_pixels(matrices, sizes, low, high, only, quantile, middles, values, 
     low, high
         float64 (3,): the box, relative to the eye.
     only
-        The direction whose face shows all rays; −1 where each ray belongs to that of its largest component.
+        The direction whose face shows all rays; −1 where each ray is that of the direction whose own it is.
+    reach
+        > 1: see `bound_sight`.
     quantile
         0 … 1.
     middles
         float64 (views, 6, 3): a ray to the middle of what is seen in each direction, taken where no pixel of
         the grid shows the box; zeros where nothing is seen.
-    values, counts
-        float64 (6, grid²) and int64 (6,): scratch.
+    values, weights, counts
+        float64 (6, grid²) twice, and int64 (6,): scratch.
     out
         float64 (views, 6), overwritten: the smaller singular value of ∂t/∂pixel; 0 where nothing is seen.
     """
     grid = np.int64(np.sqrt(values.shape[1]) + 0.5)
+    least = 1.0 / reach
     for view in range(matrices.shape[0]):
         m = matrices[view]
         counts[:] = 0
@@ -186,28 +212,26 @@ def measure_pixels(matrices, sizes, low, high, only, quantile, middles, values, 
                 x = m[0, 0] * column + m[0, 1] * row + m[0, 2]
                 y = m[1, 0] * column + m[1, 1] * row + m[1, 2]
                 z = m[2, 0] * column + m[2, 1] * row + m[2, 2]
-                direction = only
-                if only < 0:
-                    direction = 1 if x > 0.0 else 0
-                    largest = abs(x)
-                    if abs(y) > largest:
-                        direction, largest = 3 if y > 0.0 else 2, abs(y)
-                    if abs(z) > largest:
-                        direction = 5 if z > 0.0 else 4
-                k = direction // 2
-                along = x if k == 0 else y if k == 1 else z
-                if (along > 0.0) == (direction % 2 == 1) and along != 0.0 and _meets(low, high, x, y, z):
-                    values[direction, counts[direction]] = _pixel_size(m, direction, x, y, z)
-                    counts[direction] += 1
+                inside = _part_in_box(low, high, x, y, z)
+                if inside <= 0.0:
+                    continue
+                largest = max(abs(x), abs(y), abs(z))
+                for k in range(3):
+                    along = x if k == 0 else y if k == 1 else z
+                    direction = 2 * k + (1 if along > 0.0 else 0)
+                    if only < 0:
+                        weight = inside * (abs(along) / largest - least)
+                    else:
+                        weight = inside if direction == only and along != 0.0 else 0.0
+                    if weight > 0.0:
+                        values[direction, counts[direction]] = _pixel_size(m, direction, x, y, z)
+                        weights[direction, counts[direction]] = weight
+                        counts[direction] += 1
         for direction in range(6):
             n = counts[direction]
             x, y, z = middles[view, direction]
             out[view, direction] = 0.0
             if n > 0:
-                ordered = np.sort(values[direction, :n])
-                at = quantile * (n - 1)
-                first = np.int64(at)
-                last = min(first + 1, n - 1)
-                out[view, direction] = ordered[first] + (at - first) * (ordered[last] - ordered[first])
+                out[view, direction] = _quantile(values[direction, :n], weights[direction, :n], quantile)
             elif x != 0.0 or y != 0.0 or z != 0.0:
                 out[view, direction] = _pixel_size(m, direction, x, y, z)

@@ -71,8 +71,8 @@ def _limit(constant, slope, interval):
 
 
 @parallel_kernel
-def warp(face_from_view, borders, sizes, pixels, written, out):
-    """Look every pixel's ray up in the face that owns it, bilinearly; nothing outside the faces.
+def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, out):
+    """Look every pixel's ray up in the faces that show it, bilinearly; nothing outside the faces.
 
     Parameters
     ----------
@@ -81,6 +81,12 @@ def warp(face_from_view, borders, sizes, pixels, written, out):
     borders
         float64 (n, m, 3): a face shows the pixel points p = (column, row, 1) with b·p ≥ 0 for its m borders
         b.
+    inner
+        float64 (n, m, 3): likewise where it does so alone; else it is mixed with others (`geometry.seams`).
+    places
+        float64 (n, 3): tangents (t_i, t_j) of each face's first pixel centre, and its pitch.
+    alone
+        c of the seams: how much faces count where they are mixed.
     sizes
         int64 (n, 3): width, height and first pixel in `pixels`.
     pixels
@@ -96,6 +102,9 @@ def warp(face_from_view, borders, sizes, pixels, written, out):
         interval = np.empty(2)
         at, below = np.empty(_CHUNK, np.uint64), np.empty(_CHUNK, np.uint64)
         across, down = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
+        counts, found = np.empty(_CHUNK, np.float32), np.empty(4 * _CHUNK, np.float32)
+        total = np.zeros(out.shape[1] if len(sizes) > 1 else 0, np.float32)
+        mixed_begin, mixed_end = out.shape[1], 0
         old_begin, old_end = written[row, 0], written[row, 1]
         written[row, 0], written[row, 1] = out.shape[1], 0
         if len(sizes) > 1:
@@ -105,6 +114,7 @@ def warp(face_from_view, borders, sizes, pixels, written, out):
             u_0, v_0, w_0 = h[0, 1] * y + h[0, 2], h[1, 1] * y + h[1, 2], h[2, 1] * y + h[2, 2]
             u_x, v_x, w_x = h[0, 0], h[1, 0], h[2, 0]
             last_u, last_v = width - 1.0, height - 1.0
+            t_i, t_j, pitch = places[face, 0], places[face, 1], places[face, 2]
             interval[0], interval[1] = 0.0, np.float64(out.shape[1])
             for n in range(borders.shape[1]):
                 b = borders[face, n]
@@ -121,17 +131,42 @@ def warp(face_from_view, borders, sizes, pixels, written, out):
                 out[row, min(max(end, old_begin), old_end) : old_end] = _F(0.0)
             if begin < end:
                 written[row, 0], written[row, 1] = min(written[row, 0], begin), max(written[row, 1], end)
-            for first in range(begin, end, _CHUNK):
-                count = min(end - first, _CHUNK)
-                for n in range(np.uint64(count)):
-                    x = np.float64(first + np.int64(n)) + 0.5
-                    scale = 1.0 / (w_0 + w_x * x)
-                    u = min(max((u_0 + u_x * x) * scale, 0.0), last_u)
-                    v = min(max((v_0 + v_x * x) * scale, 0.0), last_v)
-                    left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
-                    across[n], down[n] = _F(u - left), _F(v - top)
-                    start = np.uint64(sizes[face, 2] + np.int64(top) * width + np.int64(left))
-                    at[n], below[n] = start, start + np.uint64(width)
-                to = np.uint64(row * out.shape[1] + first)
-                for n in range(np.uint64(count)):
-                    _look_up(pixels, at[n], below[n], across[n], down[n], flat, to + n)
+            for n in range(inner.shape[1]):
+                b = inner[face, n]
+                _limit(b[1] * y + b[2], b[0], interval)
+            alone_begin = min(max(np.int64(min(interval[0], np.float64(end))), begin), end)
+            alone_end = min(max(np.int64(max(interval[1], 0.0)), alone_begin), end)
+            for piece in range(3):
+                mixed = piece != 1
+                piece_begin = begin if piece == 0 else alone_begin if piece == 1 else alone_end
+                piece_end = alone_begin if piece == 0 else alone_end if piece == 1 else end
+                if mixed and piece_begin < piece_end:
+                    mixed_begin, mixed_end = min(mixed_begin, piece_begin), max(mixed_end, piece_end)
+                for first in range(piece_begin, piece_end, _CHUNK):
+                    count = min(piece_end - first, _CHUNK)
+                    for n in range(np.uint64(count)):
+                        x = np.float64(first + np.int64(n)) + 0.5
+                        scale = 1.0 / (w_0 + w_x * x)
+                        u = min(max((u_0 + u_x * x) * scale, 0.0), last_u)
+                        v = min(max((v_0 + v_x * x) * scale, 0.0), last_v)
+                        left, top = min(np.floor(u), last_u - 1.0), min(np.floor(v), last_v - 1.0)
+                        across[n], down[n] = _F(u - left), _F(v - top)
+                        start = np.uint64(sizes[face, 2] + np.int64(top) * width + np.int64(left))
+                        at[n], below[n] = start, start + np.uint64(width)
+                        steepest = max(abs(t_i + u * pitch), abs(t_j + v * pitch), 1.0)
+                        counts[n] = _F(max(1.0 / steepest - alone, 0.0))
+                    to = np.uint64(row * out.shape[1] + first)
+                    if mixed:
+                        for n in range(np.uint64(count)):
+                            _look_up(pixels, at[n], below[n], across[n], down[n], found, n)
+                        for n in range(np.uint64(count)):
+                            total[first + n] += counts[n]
+                            for channel in range(4):
+                                out[row, first + n, channel] += counts[n] * found[4 * n + channel]
+                    else:
+                        for n in range(np.uint64(count)):
+                            _look_up(pixels, at[n], below[n], across[n], down[n], flat, to + n)
+        for x in range(mixed_begin, mixed_end):
+            if total[x] > _F(0.0):
+                for channel in range(4):
+                    out[row, x, channel] /= total[x]

@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import SettingsError
-from ..geometry.faces import EyeGeometry, Face
+from ..geometry.faces import Face
+from ..geometry.sight import EyeGeometry, seen_volume
 from ..volume.levels import STANDARD_AXES
 
-# Pieces of the integral over slices; voxels a pixel beyond which coarser levels of detail take fewer slices.
-_PIECES = 64
+# Voxels a pixel beyond which coarser levels of detail take fewer slices.
 COARSER = 2**1.5
 
 
@@ -103,22 +103,11 @@ def samples_in_box(geometry: EyeGeometry, face: Face) -> float:
     Accuracy: packets of 16 pixels take whole samples at its edges, steep ones twice as many: the count is up
     to twice this, in a ratio that changes slowly as the eye moves.
     """
-    i, j, k = STANDARD_AXES[face.axis]
-    low, high = geometry.low[[i, j, k]], geometry.high[[i, j, k]]
+    pitch = face.pitch
     if geometry.at_infinity:
-        return float(np.prod(high - low)) / face.pitch**2
-    eye = geometry.eye[[i, j, k]]
-    ends = sorted(face.sign * (np.array([low[2], high[2]]) - eye[2]))
-    front, back = max(float(ends[0]), 0.0), float(ends[1])
-    if back <= front:
-        return 0.0
-    width = (back - front) / _PIECES
-    distance = front + width * (np.arange(_PIECES) + 0.5)
-    seen = width / (distance * face.pitch) ** 2 * np.minimum(1.0, COARSER / (distance * face.pitch))
-    for axis in range(2):
-        start = np.maximum(low[axis] - eye[axis], face.origin[axis] * distance)
-        end = np.minimum(
-            high[axis] - eye[axis], (face.origin[axis] + face.size[axis] * face.pitch) * distance
-        )
-        seen = seen * np.maximum(end - start, 0.0)
-    return float(seen.sum())
+        return float(np.prod((geometry.high - geometry.low)[list(STANDARD_AXES[face.axis])])) / pitch**2
+    low = np.array(face.origin)
+    high = low + np.multiply(face.size, pitch)
+    distances, shown = seen_volume(geometry, face.axis, face.sign, low, high)
+    finer = np.maximum(distances * pitch / COARSER, 1.0)
+    return float((shown / finer).sum()) / pitch**2

@@ -26,7 +26,7 @@ _log = logging.getLogger("persp_sw")
 _PACKAGE = Path(_jit.__file__).parent
 # What decides how long a frame takes, and what a quality means.
 _SOURCES = (
-    *("_jit.py", "compositor.py", "planning.py", "sampling.py", "seams.py", "kernels/*.py", "geometry/*.py"),
+    *("_jit.py", "compositor.py", "planning.py", "sampling.py", "kernels/*.py", "geometry/*.py"),
     *("optics/classification.py", "optics/preintegration.py", "volume/mip.py", "volume/runs.py"),
 )
 _SAMPLED = 64  # voxels along each axis that a volume is known by

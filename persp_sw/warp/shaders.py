@@ -29,10 +29,9 @@ float window_depth(vec2 zw) {
 }
 """
 
-# Each fragment asks every face where its ray meets it, and takes the face on which that is nearest to the
-# middle: the ray's largest component, and one face only, whatever the rounding.
+# Each fragment asks every face where its ray meets it, and mixes those whose own it is or nearly is as
+# `geometry.seams` says. Its depth is that of the face on which the ray is nearest to the middle.
 _FACES = f"""
-const float OWN = 1.00001;        // faces of several show tangents up to 1
 const float SLACK = 1.0 / 512.0;  // pixels of rounding
 const float EVERYWHERE = 1e30;
 
@@ -43,7 +42,7 @@ uniform mat3 face_from_ndc[{MOST_FACES}];
 uniform vec2 last[{MOST_FACES}];     // size − 1
 #ifdef FACES
 uniform vec2 middle[{MOST_FACES}];   // tangents
-uniform float pitch;
+uniform float pitch, alone;          // alone: c of the seams
 #endif
 #ifdef DEPTH
 #ifdef PARALLEL
@@ -77,28 +76,11 @@ vec2 middle_of_ray(vec3 start, vec3 along) {{
 }}
 #endif
 
-void main() {{
-    int face = 0;
-    vec2 size = last[0];
-#ifdef FACES
-    float best = EVERYWHERE;
-    vec2 place = vec2(0.0);
-    for (int n = 0; n < FACES; n++) {{
-        vec3 point = face_from_ndc[n] * vec3(ndc, 1.0);
-        if (point.z > 0.0) {{
-            vec2 found = point.xy / point.z, tangents = abs(middle[n] + pitch * found);
-            float steepest = max(tangents.x, tangents.y);
-            if (steepest < best) {{ best = steepest; face = n; place = found; size = last[n]; }}
-        }}
-    }}
-    if (best > OWN) discard;
-#else
-    vec3 point = face_from_ndc[0] * vec3(ndc, 1.0);
-    if (!(point.z > 0.0)) discard;
-    vec2 place = point.xy / point.z;
-#endif
-    vec2 at = place + 0.5 * size;
-    if (any(lessThan(at, vec2(-SLACK))) || any(greaterThan(at, size + SLACK))) discard;
+// What a face shows at a place, its pixels counted from its middle; nothing outside of it.
+bool look_up(int face, vec2 place, out vec4 found) {{
+    vec2 size = last[face], at = place + 0.5 * size;
+    found = vec4(0.0);
+    if (any(lessThan(at, vec2(-SLACK))) || any(greaterThan(at, size + SLACK))) return false;
 #ifdef EXACT
     // A texture unit's own filter has weights of 8 bits on most hardware.
     at = clamp(at, vec2(0.0), size);
@@ -107,11 +89,43 @@ void main() {{
     vec4 above = mix(texelFetch(texels, texel, 0), texelFetch(texels, texel + ivec3(1, 0, 0), 0), share.x);
     vec4 under = mix(texelFetch(texels, texel + ivec3(0, 1, 0), 0),
                      texelFetch(texels, texel + ivec3(1, 1, 0), 0), share.x);
-    colour = mix(above, under, share.y);
+    found = mix(above, under, share.y);
 #else
     vec2 texture_size = vec2(textureSize(texels, 0).xy);
-    colour = textureLod(texels, vec3((clamp(at, vec2(0.0), size) + 0.5) / texture_size, face), 0.0);
+    found = textureLod(texels, vec3((clamp(at, vec2(0.0), size) + 0.5) / texture_size, face), 0.0);
 #endif
+    return true;
+}}
+
+void main() {{
+    int face = 0;
+    bool shown = false;
+    vec4 found;
+#ifdef FACES
+    float best = EVERYWHERE, total = 0.0;
+    vec2 place = vec2(0.0);
+    colour = vec4(0.0);
+    for (int n = 0; n < FACES; n++) {{
+        vec3 point = face_from_ndc[n] * vec3(ndc, 1.0);
+        if (!(point.z > 0.0)) continue;
+        vec2 there = point.xy / point.z, tangents = abs(middle[n] + pitch * there);
+        float steepest = max(tangents.x, tangents.y);
+        float counts = 1.0 / max(steepest, 1.0) - alone;
+        if (steepest < best) {{ best = steepest; face = n; place = there; }}
+        if (counts > 0.0 && look_up(n, there, found)) {{
+            shown = true;
+            colour += counts * found;
+            total += counts;
+        }}
+    }}
+    if (shown) colour /= total;
+#else
+    vec3 point = face_from_ndc[0] * vec3(ndc, 1.0);
+    vec2 place = point.xy / point.z;
+    if (point.z > 0.0) shown = look_up(0, place, found);
+    colour = found;
+#endif
+    if (!shown) discard;
 #ifdef DEPTH
     vec3 where = vec3(place, 1.0), start = vec3(0.0);
 #ifdef PARALLEL

@@ -86,14 +86,24 @@ def _draw(image: EyeImage, view: View, shift: NDArray[np.float64], canvas: Canva
     faces = image.faces
     distance = distance_for(image, shift) if shift.any() else None
     rays = [_tangents(face, object_from_world, view, shift, distance) for face in faces]
+    borders = [_borders(image, face, object_from_world, view, shift, distance) for face in faces]
+    shown, inner = (np.array(planes) for planes in zip(*borders, strict=True))
     warp(
         np.array([_pixel_from_tangents(face) @ matrix for face, matrix in zip(faces, rays, strict=True)]),
-        np.array([_borders(face, len(faces), object_from_world, view, shift, distance) for face in faces]),
+        shown,
+        inner,
+        np.array([_first_place(face) for face in faces]),
+        image.alone,
         np.array([(*face.size, image.offset(number)) for number, face in enumerate(faces)]),
         image.pixels,
         canvas.written,
         canvas.pixels,
     )
+
+
+def _first_place(face: Face) -> tuple[float, float, float]:
+    """Tangents of the first pixel's centre, and the pitch."""
+    return face.origin[0] + face.pitch / 2, face.origin[1] + face.pitch / 2, face.pitch
 
 
 def _pixel_from_tangents(face: Face) -> Matrix:
@@ -126,32 +136,33 @@ def _tangents(
 
 
 def _borders(
+    image: EyeImage,
     face: Face,
-    count: int,
     object_from_world: Matrix,
     view: View,
     shift: NDArray[np.float64],
     distance: float | None,
-) -> NDArray[np.float64]:
-    """(m, 3): the face shows pixel points p with b·p ≥ 0; a single face shows all rays it holds.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(m, 3) each: the face shows pixel points p with b·p ≥ 0, and alone where b·p ≥ 0 of the second, too.
 
-    Of several each shows the rays whose largest component is its own; for a moved eye those that leave the
-    box of all faces through its side: d_k / (D − δ_k) is the largest of the six. Either side of a border has
-    the same numbers with opposite signs.
+    One of several shows rays with tangents up to 1 / c, see `seams`, and alone those up to c. What one shows
+    alone ends where another begins: the same numbers with opposite signs. A single face shows all rays it
+    holds. To an eye that has moved, faces side by side lie at different places once they are extended beyond
+    their seam: all is mixed, by the tangents that each finds.
     """
-    if count == 1:
-        return np.empty((0, 3))
+    if len(image.faces) == 1:
+        return np.empty((0, 3)), np.empty((0, 3))
+    c = image.alone
     direction = object_from_world[:3, :3] @ view.direction_from_pixel
     i, j, k = STANDARD_AXES[face.axis]
     along = face.sign * direction[k]
     if distance is None:
-        beside = direction[i], -direction[i], direction[j], -direction[j]
-        return np.array([along - other for other in beside])
+        beside = np.array([direction[i], -direction[i], direction[j], -direction[j]])
+        return along - c * beside, c * along - beside
     reach = distance - face.sign * shift[k]
-    return np.array(
-        [
-            (distance - sign * shift[axis]) * along - reach * (sign * direction[axis])
-            for axis in (i, j)
-            for sign in (1, -1)
-        ]
-    )
+    shown = [
+        (distance - c * sign * shift[axis]) * along - c * reach * (sign * direction[axis])
+        for axis in (i, j)
+        for sign in (1, -1)
+    ]
+    return np.array(shown), np.tile([0.0, 0.0, -1.0], (4, 1))

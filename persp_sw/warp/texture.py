@@ -249,6 +249,7 @@ def _face_uniforms(layer: _Layer, options: dict[str, bool]) -> dict[str, NDArray
     }
     if len(image.faces) > 1:
         uniforms |= {"middle": quads.middles, "pitch": np.float32(image.faces[0].pitch)}
+        uniforms |= {"alone": np.float32(image.alone)}
     if options["DEPTH"]:
         planes = image.half_spaces[: shaders.MOST_PLANES].copy()
         planes[:, 3] += planes[:, :3] @ quads.base
