@@ -16,6 +16,7 @@ import pytest
 from samples import fails, result_of
 
 import persp_sw as psw
+from persp_sw.quality.ladder import Point, Rung
 from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.preview.choices import QUALITY_STEP
 from vr_plugin.preview.figures import Rate, figures, quality_line
@@ -55,8 +56,16 @@ class Machine:
         What was drawn, frame by frame: (wanted, done).
     """
 
-    def __init__(self, scene: psw.Scene, *, quality: float = 1.0, trace: Any = None, **options: Any):
-        settings = psw.Settings(quality=quality)
+    def __init__(
+        self,
+        scene: psw.Scene,
+        *,
+        quality: float = 1.0,
+        samples_per_interval: int | None = None,
+        trace: Any = None,
+        **options: Any,
+    ):
+        settings = psw.Settings(quality=quality, samples_per_interval=samples_per_interval)
         self.preview, self.pictures = open_preview(
             scene, settings, size=SIZE, **{"target_hz": TARGET_HZ, **options}
         )
@@ -343,6 +352,29 @@ def test_another_preset_walks_its_own_ladder(machine: Callable[..., Machine], mo
     m.press(".")
     assert _inside(m).controller is not before
     assert ladders == [m.pictures.renderer.transfer]  # once, for both views
+
+
+@pytest.mark.parametrize("own", [{}, {"samples_per_interval": 4}])
+def test_a_preset_s_ladder_is_judged_by_the_user_s_settings(
+    machine: Callable[..., Machine], monkeypatch, own: dict[str, int]
+):
+    """Not by what the last ladder's rung made of them: here rays sampled otherwise than usual."""
+    points = (Point(0.25, 1.0), Point(2.0, 64.0))
+    found = []
+
+    def ladder_for(renderer: psw.Renderer) -> psw.Ladder:
+        found.append(psw.Ladder((Rung(f"rung {len(found)}", {"samples_per_interval": 2}, points),)))
+        return found[-1]
+
+    monkeypatch.setattr(psw, "ladder_for", ladder_for)
+    m = machine(presets=("fog", "simulation"), **own)
+    m.turn(3, orbit=0.005)
+    quality = m.last["quality"]
+    m.press(".")
+    assert [rung.name for rung in _inside(m).controller.ladder.rungs] == ["as set" if own else "rung 1"]
+    assert m.last["quality"] == pytest.approx(quality, rel=0.3)  # it goes on from there
+    assert len(found) == (0 if own else 2)
+    assert m.pictures.renderer.settings.samples_per_interval == (4 if own else 2)
 
 
 # --- by hand -----------------------------------------------------------------------------------------------

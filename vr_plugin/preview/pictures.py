@@ -223,6 +223,8 @@ class PreviewPictures:
     def _make_steady(self) -> None:
         """Frames in their time, of either view, by the ladder of the transfer function that is."""
         aim = QualityAim() if self.rig is None else self.rig.quality
+        # What the last ladder's rung changed is none of the user's choices.
+        self.renderer.settings = replace(self._base, quality=self.renderer.settings.quality)
         rate_hz, ladder = self.target_hz, None
         for maker in self._makers:
             controller = controller_for(self.renderer, aim, rate_hz, ladder) if rate_hz else None
