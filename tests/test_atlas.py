@@ -18,7 +18,7 @@ from persp_sw import Regions, Renderer, TransferFunction, View, Volume, composit
 from persp_sw.geometry.faces import Face
 from persp_sw.geometry.view import Eye
 from persp_sw.measure.atlas import catalogue, eye_positions, plain, shapes, values
-from persp_sw.measure.atlas.case import Case, Finding, Scale, Strip
+from persp_sw.measure.atlas.case import Case, Finding, Scale, Strip, in_parts
 from persp_sw.measure.atlas.outcome import outcome_of
 from persp_sw.measure.atlas.page import number_text, write_page, write_pictures
 from persp_sw.measure.atlas.strips import strip_rgb
@@ -70,6 +70,23 @@ def test_the_catalogue_can_be_named_and_read():
     for case in catalogue.CASES:
         assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", case.name)
         assert case.title and case.what.endswith(".") and len(case.what) > 80
+
+
+def test_parts_follow_one_another_and_progress_hears_of_each():
+    heard = []
+
+    def part(name: str, count: int):
+        def measured(scale: Scale) -> list[Finding]:
+            heard.append((name, scale))
+            return [Finding(f"{name} {n}", n, 9.0, "nine") for n in range(count)]
+
+        return measured
+
+    parts = {"one": part("one", 2), "none": part("none", 0), "two": part("two", 1)}
+    found = in_parts(parts, QUICK, lambda *said: heard.append(said))
+    assert [finding.metric for finding in found] == ["one 0", "one 1", "two 0"]
+    said = [(0, 3, "one"), (1, 3, "none"), (2, 3, "two"), (3, 3, "done")]
+    assert heard == [said[0], ("one", QUICK), said[1], ("none", QUICK), said[2], ("two", QUICK), said[3]]
 
 
 # --- Findings ---------------------------------------------------------------------------------------------

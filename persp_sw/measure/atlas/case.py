@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -89,6 +89,9 @@ class Finding:
         return bool(self.value >= self.bound if self.at_least else self.value <= self.bound)
 
 
+Part = Callable[[Scale], Sequence[Finding]]  # of a case: measures some of its metrics
+
+
 @dataclass(frozen=True)
 class Case:
     """A way in which volume renderers fail.
@@ -109,3 +112,13 @@ class Case:
     title: str
     what: str
     run: Callable[[Scale, Progress], list[Finding]]
+
+
+def in_parts(parts: Mapping[str, Part], scale: Scale, progress: Progress) -> list[Finding]:
+    """The findings of all parts, measured one after the other; progress is told the name of each."""
+    found: list[Finding] = []
+    for done, (name, part) in enumerate(parts.items()):
+        progress(done, len(parts), name)
+        found += part(scale)
+    progress(len(parts), len(parts), "done")
+    return found

@@ -10,7 +10,7 @@ from ...renderer import Renderer
 from ...settings import Settings
 from ...volume import phantoms
 from ...volume.grid import Volume
-from .case import Case, Finding, Progress, Scale, Strip
+from .case import Case, Finding, Part, Progress, Scale, Strip, in_parts
 from .compositing import DIRECTIONS, composite, faces_of, homogeneous, view_towards
 from .moving_plane import moving_findings
 
@@ -135,23 +135,21 @@ def nothing_finding() -> Finding:
     )
 
 
+def _closed_form(name: str, cases: list[Regions]) -> Part:
+    return lambda scale: [closed_form_finding(name, cases, scale)]
+
+
 def run(scale: Scale, progress: Progress) -> list[Finding]:
     """Planes at rest, then planes that move."""
-    parts = {
-        "planes through voxel centres": through_centres,
-        "planes nearly along slices": along_slices,
-        "slivers": slivers,
+    closed_form = {
+        "planes through voxel centres": through_centres(),
+        "planes nearly along slices": along_slices(),
+        "slivers": slivers(),
     }
-    found = []
-    for done, (name, cases) in enumerate(parts.items()):
-        progress(done, len(parts) + 2, name)
-        found.append(closed_form_finding(name, cases(), scale))
-    progress(len(parts), len(parts) + 2, "nothing left")
-    found += [sliver_brightness(scale), nothing_finding()]
-    progress(len(parts) + 1, len(parts) + 2, "moving planes")
-    found += moving_findings(scale)
-    progress(len(parts) + 2, len(parts) + 2, "done")
-    return found
+    parts: dict[str, Part] = {name: _closed_form(name, cases) for name, cases in closed_form.items()}
+    parts["nothing left"] = lambda scale: [sliver_brightness(scale), nothing_finding()]
+    parts["moving planes"] = moving_findings
+    return in_parts(parts, scale, progress)
 
 
 CASE = Case(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ...renderer import Renderer
 from ...settings import Settings
 from ...volume.grid import Volume
 from . import plain
-from .case import Case, Finding, Progress, Scale, Strip
+from .case import Case, Finding, Progress, Scale, Strip, in_parts
 
 Array = NDArray[np.float64]
 
@@ -106,16 +107,15 @@ def findings(volume: Volume, views: list[View], times: int) -> list[Finding]:
     ]
 
 
+def _findings_of(make: Callable[[int], Volume], scale: Scale) -> list[Finding]:
+    volume = make(scale.pick(40, 64))
+    return findings(volume, path(volume, scale.pick(4, 6), scale.pick(24, 40)), scale.pick(3, 4))
+
+
 def run(scale: Scale, progress: Progress) -> list[Finding]:
     """Noise and a checkerboard."""
-    volumes = [make(scale.pick(40, 64)) for make in (noise, checkerboard)]
-    found = []
-    for done, volume in enumerate(volumes):
-        progress(done, len(volumes), volume.name)
-        views = path(volume, scale.pick(4, 6), scale.pick(24, 40))
-        found += findings(volume, views, scale.pick(3, 4))
-    progress(len(volumes), len(volumes), "done")
-    return found
+    parts = {make.__name__: partial(_findings_of, make) for make in (noise, checkerboard)}
+    return in_parts(parts, scale, progress)
 
 
 CASE = Case(

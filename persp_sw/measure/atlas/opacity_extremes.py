@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,7 +12,7 @@ from ...volume import phantoms
 from ...volume.grid import Volume
 from ..exact import shown_part
 from . import plain
-from .case import Case, Finding, Progress, Scale, Strip
+from .case import Case, Finding, Part, Progress, Scale, Strip, in_parts
 from .compositing import DIRECTIONS, composite, faces_of, homogeneous, view_towards
 from .thin_sheets import sheet_findings
 
@@ -205,23 +203,18 @@ def termination_findings(scale: Scale) -> list[Finding]:
     ]
 
 
-PARTS: tuple[tuple[str, Callable[[Scale], list[Finding]]], ...] = (
-    ("homogeneous boxes", slab_findings),
-    ("thin sheets", sheet_findings),
-    ("bytes and floats", byte_findings),
-    ("faint fog", fog_findings),
-    ("termination", termination_findings),
-)
+PARTS: dict[str, Part] = {
+    "homogeneous boxes": slab_findings,
+    "thin sheets": sheet_findings,
+    "bytes and floats": byte_findings,
+    "faint fog": fog_findings,
+    "termination": termination_findings,
+}
 
 
 def run(scale: Scale, progress: Progress) -> list[Finding]:
     """All parts, one after the other."""
-    found: list[Finding] = []
-    for done, (what, part) in enumerate(PARTS):
-        progress(done, len(PARTS), what)
-        found += part(scale)
-    progress(len(PARTS), len(PARTS), "done")
-    return found
+    return in_parts(PARTS, scale, progress)
 
 
 CASE = Case(

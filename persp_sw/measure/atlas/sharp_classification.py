@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from ...optics.transfer import TransferFunction
 from ...volume.grid import Volume
 from ..exact import Ball
 from . import plain
-from .case import Case, Finding, Progress, Scale, Strip
+from .case import Case, Finding, Part, Progress, Scale, Strip, in_parts
 from .colour_exposure import exposure_findings
 from .compositing import composite, rms, view_towards
 from .face_views import face_view
@@ -196,17 +197,12 @@ def ring_findings(scale: Scale) -> list[Finding]:
 
 def run(scale: Scale, progress: Progress) -> list[Finding]:
     """All of it: orders of three functions, rings, and hidden colours."""
-    found: list[Finding] = []
-    table = functions()
-    for done, (name, transfer) in enumerate(table.items()):
-        progress(done, len(table) + 2, name)
-        found += order_findings(name, transfer, scale)
-    progress(len(table), len(table) + 2, "rings")
-    found += ring_findings(scale)
-    progress(len(table) + 1, len(table) + 2, "colour exposure")
-    found += exposure_findings(scale)
-    progress(len(table) + 2, len(table) + 2, "done")
-    return found
+    parts: dict[str, Part] = {
+        name: partial(order_findings, name, transfer) for name, transfer in functions().items()
+    }
+    parts["rings"] = ring_findings
+    parts["colour exposure"] = exposure_findings
+    return in_parts(parts, scale, progress)
 
 
 CASE = Case(
