@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import multiprocessing
 from pathlib import Path
@@ -348,6 +349,43 @@ def test_a_chart_of_what_cannot_be_rendered_is_a_mistake(scene_file: Path, tmp_p
     assert ".png, .svg" in fails("chart", scene_file, "-o", tmp_path / "a.jpg")
     (tmp_path / "b.svg").mkdir()
     assert "b.svg" in fails("chart", scene_file, "-o", tmp_path / "b")
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ViewError("not from here"), RuntimeError("a fault")])
+@pytest.mark.parametrize("fails_at", ["measure.chart.chart_of", "measure.plot.draw"])
+def test_a_chart_that_breaks_off_leaves_files_as_they_were(
+    scene_file: Path, tmp_path: Path, ladders: Path, monkeypatch, fails_at: str, error: BaseException
+):
+    pytest.importorskip("matplotlib")
+    module, name = f"persp_sw.{fails_at}".rsplit(".", 1)
+    whole, calls = getattr(importlib.import_module(module), name), []
+
+    def second_fails(*arguments):
+        calls.append(arguments)
+        if len(calls) == 2:
+            raise error
+        return whole(*arguments)
+
+    monkeypatch.setattr(f"persp_sw.{fails_at}", second_fails)
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "a.png").write_text("an earlier one")
+    sizes = ("--size", 24, "--size", 32)
+    result = run("chart", scene_file, *sizes, "--quality", 1, *CHART, "-o", out / "a.png")
+    assert result.exit_code == {KeyboardInterrupt: 130}.get(error, 2 if isinstance(error, ViewError) else 1)
+    assert len(calls) == 2
+    assert [path.name for path in out.iterdir()] == ["a.png"]
+    assert (out / "a.png").read_bytes() == b"an earlier one"
+
+
+@pytest.mark.parametrize("before", [None, "an earlier one"])
+def test_a_bench_that_cannot_begin_leaves_its_file_as_it_was(tmp_path: Path, before: str | None):
+    out = tmp_path / "new" / "result.json"
+    if before:
+        out.parent.mkdir()
+        out.write_text(before)
+    assert "no case matches" in fails("bench", "--volume", "ct16", "--match", "xyz", "-o", out)
+    assert (out.read_text() if out.exists() else None) == before
 
 
 # --- warmup ------------------------------------------------------------------------------------------------

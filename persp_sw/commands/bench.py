@@ -10,10 +10,10 @@ from typing import Any
 
 import click
 
-from ..errors import FileError, PerspSWError, SettingsError
+from ..errors import PerspSWError, SettingsError
 from .choose_cases import case_options, chosen_cases, peer_option, threads_chosen
 from .options import json_option
-from .output import plain, print_json, progress_bars
+from .output import plain, print_json, progress_bars, try_to_write
 
 _EPILOG = """\b
 Examples:
@@ -81,7 +81,9 @@ def bench(
         raise SettingsError(f"--seconds lies between 0 and 600; given {seconds:g}")
     if ablate and peers:
         raise PerspSWError("--ablate compares the renderer with itself; leave --peer out")
-    path = _writable(out)
+    path = None if out is None else Path(out)
+    if path is not None:
+        try_to_write(path)
     cases = chosen_cases(scenes, **choice)
     threads = threads_chosen(counts)
     settings = [
@@ -153,19 +155,6 @@ def plan_with(plan: Any, threads: int) -> Any:
     from dataclasses import replace
 
     return replace(plan, settings=[s for s in plan.settings if s.threads == threads])
-
-
-def _writable(out: str | None) -> Path | None:
-    """The file to write, tried before anything is measured."""
-    if out is None:
-        return None
-    path = Path(out)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.open("a").close()
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror}; choose another file with -o") from None
-    return path
 
 
 def _write(path: Path, result: dict[str, Any]) -> None:

@@ -15,7 +15,7 @@ from ..errors import FileError, MissingPackageError, SettingsError
 from .bench_tables import print_chart
 from .choose_cases import case_options, chosen_cases, peer_option, threads_chosen
 from .options import json_option
-from .output import plain, print_json, progress_bars
+from .output import plain, print_json, progress_bars, try_to_write
 
 if TYPE_CHECKING:
     from ..measure.chart import Chart
@@ -120,11 +120,12 @@ def chart(
         "textures": [{"case": chart.rows[0]["case"], **row} for chart in charts for row in chart.textures],
         "ladders": _save_ladders(charts, base, qualities),
     }
-    for path in files:
-        if path.suffix == ".json":
-            path.write_text(json.dumps(plain(values), ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
-        else:
-            draw([chart.rows for chart in charts], path)
+    text = json.dumps(plain(values), ensure_ascii=False, indent=1) + "\n"
+    contents = {path: text.encode() for path in files if path.suffix == ".json"}
+    drawn = (path for path in files if path not in contents)
+    contents |= {path: draw([chart.rows for chart in charts], path.suffix[1:]) for path in drawn}
+    for path, content in contents.items():  # a run that broke off before has left files as they were
+        path.write_bytes(content)
     if as_json:
         print_json(values)
     else:
@@ -167,9 +168,5 @@ def _output_files(out: str) -> list[Path]:
         raise MissingPackageError("chart needs the package matplotlib: pip install 'persp-sw[bench]'")
     files = [given.with_suffix(s) for s in (".png", ".svg", *([".pdf"] if suffix == ".pdf" else []), ".json")]
     for path in files:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.open("a").close()
-        except OSError as error:
-            raise FileError(f"cannot write {path}: {error.strerror}; choose another file with -o") from None
+        try_to_write(path)
     return files

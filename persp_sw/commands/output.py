@@ -8,10 +8,13 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 import numpy as np
+
+from ..errors import FileError
 
 if TYPE_CHECKING:
     from rich.console import Console  # takes 30 ms, which a picture need not wait for
@@ -63,6 +66,28 @@ def print_facts(rows: Mapping[str, str]) -> None:
     width = max(map(len, rows), default=0)
     for name, text in rows.items():
         click.echo(click.style(f"{name:<{width}}", fg="cyan") + "  " + text)
+
+
+def try_to_write(path: Path) -> None:
+    """Find out, before what takes long, whether a file can be written.
+
+    Its folder is made; the file stays as it is, and if there is none, there is none afterwards.
+
+    Raises
+    ------
+    FileError
+        It cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            path.open("x").close()
+        except FileExistsError:
+            path.open("a").close()
+        else:
+            path.unlink()
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror}; choose another file with -o") from None
 
 
 def byte_size(count: float) -> str:

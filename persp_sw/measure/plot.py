@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
+from io import BytesIO
 
 import matplotlib
 import numpy as np
@@ -31,7 +31,7 @@ _NAMED = (0.25, 0.5, 1, 2, 4)  # qualities
 _LEAST_UNLIKE = 1e-7  # 1 − SSIM of pictures that are all but equal
 
 
-def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
+def draw(panels: Sequence[Sequence[Row]], kind: str) -> bytes:
     """Two panels for each case, PSNR and SSIM over ms: a curve a sampling mode, the front, the peers.
 
     Each panel has the front of its own figure, and of what is varied besides the sampling only what is on it.
@@ -40,8 +40,13 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
     ----------
     panels
         `chart.Chart.rows`, case by case.
-    path
-        .png, .svg or .pdf.
+    kind
+        Of file: "png", "svg" or "pdf".
+
+    Returns
+    -------
+    bytes
+        What the file holds.
     """
     columns = min(_COLUMNS, len(panels))
     lines = -(-len(panels) // columns)
@@ -86,7 +91,9 @@ def draw(panels: Sequence[Sequence[Row]], path: Path) -> None:
             frameon=False,
             fontsize=8.5,
         )
-        figure.savefig(path, dpi=160)
+        file = BytesIO()
+        figure.savefig(file, format=kind, dpi=160)
+    return file.getvalue()
 
 
 def _with_unlike(row: Row) -> Row:
