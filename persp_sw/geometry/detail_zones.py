@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_BEGIN, _END = 2**1.25, 2**1.75  # voxels a pixel
+BEGIN, END = 2**1.25, 2**1.75  # voxels a pixel: where a coarser level begins, and where it rules
 
 
 @dataclass(frozen=True)
@@ -48,18 +48,18 @@ def detail_zones(tangent_pitch: float, offset_pitch: float, farthest: float, lev
     if tangent_pitch == 0:
         yield _parallel_zone(offset_pitch, levels)
         return
-    alone, far = 0.0, _BEGIN / tangent_pitch
+    alone, far = 0.0, BEGIN / tangent_pitch
     for fine in range(levels - 1):
         if far >= farthest:
             break
         yield Zone(fine, (0.0, 0.0), alone, far)
-        near, alone = far, _END * 2.0**fine / tangent_pitch
+        near, alone = far, END * 2.0**fine / tangent_pitch
         slope = 1 / (alone - near)
         last = alone >= farthest
         yield Zone(fine, (-near * slope, slope), near, np.inf if last else alone)
         if last:
             return
-        far = _BEGIN * 2.0 ** (fine + 1) / tangent_pitch
+        far = BEGIN * 2.0 ** (fine + 1) / tangent_pitch
     else:
         fine = levels - 1
     yield Zone(fine, (0.0, 0.0), alone, np.inf)
@@ -67,8 +67,8 @@ def detail_zones(tangent_pitch: float, offset_pitch: float, farthest: float, lev
 
 def _parallel_zone(apart: float, levels: int) -> Zone:
     """For parallel rays, pixels are equally far apart at all distances."""
-    fine = int(np.clip(np.floor(np.log2(apart / _BEGIN)), 0, levels - 1))
-    share = float(np.clip((apart / 2.0**fine - _BEGIN) / (_END - _BEGIN), 0, 1))
+    fine = int(np.clip(np.floor(np.log2(apart / BEGIN)), 0, levels - 1))
+    share = float(np.clip((apart / 2.0**fine - BEGIN) / (END - BEGIN), 0, 1))
     if fine == levels - 1 or share == 0:
         return Zone(fine, (0.0, 0.0), 0.0, np.inf)
     return Zone(fine + 1, (0.0, 0.0), 0.0, np.inf) if share == 1 else Zone(fine, (share, 0.0), 0.0, np.inf)

@@ -8,12 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..errors import SettingsError
+from ..geometry.detail_zones import BEGIN, END
 from ..geometry.faces import Face
 from ..geometry.sight import EyeGeometry, seen_volume
 from ..volume.levels import STANDARD_AXES
 
-# Voxels a pixel beyond which coarser levels of detail take fewer slices.
-COARSER = 2**1.5
+# Voxels a pixel beyond which coarser levels of detail take fewer slices: in the middle of their blending in.
+COARSER = (BEGIN * END) ** 0.5
 
 
 @dataclass(frozen=True)
