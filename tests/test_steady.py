@@ -13,7 +13,7 @@ from vr_plugin.eyes import eyes_of_head
 from vr_plugin.frame import FrameMaker
 from vr_plugin.pacing import controller_for
 from vr_plugin.pose import Pose
-from vr_plugin.record import Times, record_of
+from vr_plugin.record import FrameClock, Times, record_of
 from vr_plugin.rig import Eyes, QualityAim, RigWall
 from vr_plugin.shown import Shown
 from vr_plugin.steady import Steady
@@ -222,6 +222,15 @@ def test_a_record_of_a_head_that_moved_on_has_both_poses(maker):
 )
 def test_refreshes_that_a_frame_came_too_late_for_are_counted(maker, frame_ms, missed):
     assert record(maker, frame_ms)[1].missed == missed
+
+
+def test_a_frame_counts_from_the_end_of_the_one_that_it_follows_at_once():
+    clock = FrameClock()
+    assert clock.take(-0.25, 0.0, 1.0, 2.0, 3.0) == Times(-0.25, 0.0, 1.0, 2.0, 3.0, 250.0)
+    assert clock.take(0.125, 0.5, 1.0, 2.0, 3.0).frame_ms == 500.0  # though it began late; and 0 is a time
+    clock.pause()
+    assert clock.take(2.0, 2.125, 1.0, 2.0, 3.0).frame_ms == 125.0
+    assert clock.take(2.25, 2.375, 1.0, 2.0, 3.0).frame_ms == 250.0
 
 
 def test_without_a_display_nothing_was_seen(maker):

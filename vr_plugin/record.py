@@ -32,6 +32,23 @@ class Times(NamedTuple):
     frame_ms: float
 
 
+class FrameClock:
+    """Times of frames on a display: each counts from the end of the one that it follows at once."""
+
+    def __init__(self) -> None:
+        self._end_s: float | None = None  # of the last frame, where the next one follows at once
+
+    def take(self, begin_s: float, end_s: float, upload_ms: float, warp_ms: float, swap_ms: float) -> Times:
+        """The times of the frame that ends now; after a pause it counts from its own begin."""
+        frame_ms = 1e3 * (end_s - (begin_s if self._end_s is None else self._end_s))
+        self._end_s = end_s
+        return Times(begin_s, end_s, upload_ms, warp_ms, swap_ms, frame_ms)
+
+    def pause(self) -> None:
+        """The next frame does not follow the last one at once."""
+        self._end_s = None
+
+
 def record_of(
     number: int, shown: Shown, times: Times, target_ms: float, *, on_display: bool
 ) -> psw.FrameRecord:

@@ -16,7 +16,7 @@ from ..beside import Beside
 from ..frame import Frame, Picture
 from ..loop import Loop
 from ..present import Composer
-from ..record import Times, record_of
+from ..record import FrameClock, record_of
 from ..screen.events import Event, Key, asks_to_end
 from ..screen.eye_target import EyeTarget
 from ..shown import InTurn, Source
@@ -106,7 +106,7 @@ class WindowLoop:
         self.timed = trace is not None or isinstance(source, InTurn)
         self.target_ms = 1e3 / loop.rig.quality.target_hz
         self._uploaded: Frame | None = None
-        self._end_s: float | None = None
+        self._clock = FrameClock()
         walks = isinstance(loop.tracker, MouseTracker)
         self._events = TrackerEvents(loop.tracker) if walks else None
 
@@ -187,10 +187,7 @@ class WindowLoop:
         clock.append(time.monotonic())
         upload_ms, warp_ms, swap_ms = (1e3 * (end - start) for start, end in pairwise(clock))
         self.source.drawn(shown, upload_ms, warp_ms, 0.0)  # a swap does nothing but wait
-        times = Times(
-            begin, clock[-1], upload_ms, warp_ms, swap_ms, 1e3 * (clock[-1] - (self._end_s or begin))
-        )
-        self._end_s = clock[-1]
+        times = self._clock.take(begin, clock[-1], upload_ms, warp_ms, swap_ms)
         if swap_ms < _UNSYNCED_MS:
             # No display to wait for: more frames than are wanted would take the time of compositing.
             time.sleep(max(0.0, 1e-3 * self.target_ms - (clock[-1] - begin)))

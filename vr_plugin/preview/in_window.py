@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
-from ..record import Times
+from ..record import FrameClock
 from ..screen.events import Button, Closing, Event, Focus, Key, Pointer, Resized, Wheel
 from ..window import Window, Windows
 from ..worker import Worker
@@ -148,7 +148,7 @@ class PreviewLoop:
         self._shown: Composited | None = None
         self._shown_for: tuple[object, ...] = ()  # `Wanted.eye_images`
         self._refiner: Worker[Wanted, Composited] | None = None
-        self._end_s: float | None = None  # of the last frame, where this one follows at once
+        self._clock = FrameClock()
         self._kind: object = None
         self._failed: set[type] = set()
         self._title = f"{window.name}: persp-sw view"
@@ -255,13 +255,13 @@ class PreviewLoop:
         end = monotonic()
         upload_ms = figures["upload_ms"]
         warp_ms = 1e3 * (drawn - start) - upload_ms  # texts and all
-        begin = begin or start
-        frame_ms = 1e3 * (end - (self._end_s or begin))
-        times = Times(begin, end, upload_ms, warp_ms, 1e3 * (end - drawn), frame_ms)
+        times = self._clock.take(
+            start if begin is None else begin, end, upload_ms, warp_ms, 1e3 * (end - drawn)
+        )
         self._recorder.add(done, times, is_new=is_new)
         if is_new:
             self.pictures.drawn(wanted, done, upload_ms, warp_ms)  # a swap does nothing but wait
-        self._shown, self._shown_for, self._end_s = done, wanted.eye_images, end
+        self._shown, self._shown_for = done, wanted.eye_images
         self.preview.choices.drawn_quality = figures["quality"]
         if figures["encode_ms"]:
             self.window.set_title(self._title)
@@ -269,8 +269,9 @@ class PreviewLoop:
         return figures
 
     def _pause(self, seconds: float) -> None:
-        """Nothing to do for so long: the next frame does not follow at once."""
-        self.wait_s, self._end_s = seconds, None
+        """Nothing to do for so long."""
+        self.wait_s = seconds
+        self._clock.pause()
 
     def _say_progress(self, done: int, total: int, what: str) -> None:
         if threading.current_thread() is threading.main_thread():  # windows belong to it
