@@ -101,7 +101,7 @@ class Beside:
         loop.look(moment)
         return Shown(frame, moment, is_new)
 
-    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
+    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float) -> None:
         """Nothing: compositing does not wait for the display."""
 
     def wait(self, timeout_s: float | None = None) -> bool:

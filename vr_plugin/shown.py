@@ -41,8 +41,8 @@ class Source(Protocol):
     def show(self, now: float) -> Shown | None:
         """What to draw for the display's next refresh; None before the first frame is finished."""
 
-    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
-        """What drawing it took."""
+    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float) -> None:
+        """What drawing it took, without the wait for the display."""
 
     def __enter__(self) -> Source:
         """Ready; what is not finished at the end is given up."""
@@ -68,9 +68,9 @@ class InTurn:
         frame = self.loop.frame(now, now + self.ahead_s)
         return Shown(frame, frame.moment)
 
-    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float, swap_ms: float) -> None:
+    def drawn(self, shown: Shown, upload_ms: float, warp_ms: float) -> None:
         """Compositing has only what drawing leaves."""
-        self.loop.steady.drawn(shown.frame, upload_ms, warp_ms, swap_ms)
+        self.loop.steady.drawn(shown.frame, upload_ms, warp_ms)
 
     def __enter__(self) -> InTurn:
         return self

@@ -186,7 +186,7 @@ class WindowLoop:
         windows.swap()
         clock.append(time.monotonic())
         upload_ms, warp_ms, swap_ms = (1e3 * (end - start) for start, end in pairwise(clock))
-        self.source.drawn(shown, upload_ms, warp_ms, 0.0)  # a swap does nothing but wait
+        self.source.drawn(shown, upload_ms, warp_ms)  # a swap does nothing but wait
         times = self._clock.take(begin, clock[-1], upload_ms, warp_ms, swap_ms)
         if swap_ms < _UNSYNCED_MS:
             # No display to wait for: more frames than are wanted would take the time of compositing.
