@@ -1,6 +1,7 @@
 """Compositing beside the display: whole frames, newest first, refined at rest, given up when useless."""
 
 import threading
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -193,17 +194,17 @@ def test_noise_of_a_tracker_is_rest_and_a_step_aside_is_not(loop):
         assert abs(moved.head.position[0] - place[0]) > 0.01
 
 
-def test_refinement_under_way_is_given_up_when_the_head_moves(loop):
-    begun, go_on = threading.Event(), threading.Event()
-    cancels = []
+@contextmanager
+def refinement_under_way(loop):
+    """A display at rest whose refinement has begun; it goes on when told to: display, event, its cancel."""
+    begun, go_on, cancels = threading.Event(), threading.Event(), []
     make = loop.steady.make
 
     def slow(moment, cancel, resting):
-        cancels.append((resting, cancel))
         if resting:
+            cancels.append(cancel)
             begun.set()
             assert go_on.wait(WAIT)
-            cancel.check()
         return make(moment, cancel, resting)
 
     loop.steady.make = slow
@@ -214,10 +215,16 @@ def test_refinement_under_way_is_given_up_when_the_head_moves(loop):
         display.now += 2 * PERIOD
         beside.show(display.now)
         assert begun.wait(WAIT)
+        (cancel,) = cancels
+        yield display, go_on, cancel
+
+
+def test_refinement_under_way_is_given_up_when_the_head_moves(loop):
+    with refinement_under_way(loop) as (display, go_on, cancel):
         loop.tracker.at = loop.tracker.at + (0.05, 0, 0)
         display.now += PERIOD
-        beside.show(display.now)
-        assert cancels[-1][0] and cancels[-1][1].is_cancelled
+        display.beside.show(display.now)
+        assert cancel.is_cancelled
         go_on.set()
         assert display.show().frame.made.choice.why != "refined"
 
@@ -292,27 +299,10 @@ def test_compositing_that_takes_longer_than_a_head_is_foreseen_loses_no_head(loo
 
 
 def test_a_key_ends_refinement_under_way(loop):
-    begun, go_on, cancels = threading.Event(), threading.Event(), []
-    make = loop.steady.make
-
-    def slow(moment, cancel, resting):
-        if resting:
-            cancels.append(cancel)
-            begun.set()
-            assert go_on.wait(WAIT)
-        return make(moment, cancel, resting)
-
-    loop.steady.make = slow
-    with Beside(loop, PERIOD) as beside:
-        display = Display(beside)
-        while display.now + PERIOD < RestSettings().seconds:
-            display.show()
-        display.now += 2 * PERIOD
-        beside.show(display.now)
-        assert begun.wait(WAIT)
+    with refinement_under_way(loop) as (display, go_on, cancel):
         loop.steady.held = 0.4
-        beside.show(display.now + PERIOD)
-        assert cancels[0].is_cancelled
+        display.beside.show(display.now + PERIOD)
+        assert cancel.is_cancelled
         go_on.set()
         assert display.show(3).frame.made.quality == 0.4
 
