@@ -45,6 +45,21 @@ def fails(*arguments: object, code: int = 2) -> str:
     return result.stderr[result.stderr.index("error: ") :]
 
 
+def run_snippet(snippet: str, folder: Path) -> None:
+    """A program of the documentation, run in a folder as a user would: it succeeds and warns of nothing."""
+    program = folder / "snippet.py"
+    program.write_text(snippet)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", program],
+        cwd=folder,
+        env={"PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(Path.home())},
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def spawn(*arguments: object, **environment: str) -> subprocess.CompletedProcess:
     """The program in a process of its own, for what a run in this one cannot show."""
     return subprocess.run(

@@ -5,15 +5,12 @@ from __future__ import annotations
 import inspect
 import io
 import re
-import subprocess
-import sys
-from pathlib import Path
 
 import moderngl
 import numpy as np
 import pytest
 from PIL import Image
-from samples import ROOT, ball
+from samples import ROOT, ball, run_snippet
 from tolerances import QUADS
 from views import DIRECTIONS, random_pose, view_of
 
@@ -28,16 +25,7 @@ PROGRAM, QUADS_OF_BYTES = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 def test_the_program_makes_a_picture(gl_context, tmp_path):
     assert len(PROGRAM.strip().splitlines()) <= 30
     np.save(tmp_path / "head.npy", ball())
-    (tmp_path / "host.py").write_text(PROGRAM)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "host.py"],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(Path.home())},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
+    run_snippet(PROGRAM, tmp_path)
     with Image.open(tmp_path / "picture.png") as picture:
         assert picture.size == (400, 300)
         assert np.asarray(picture)[140:160, 190:210].mean() > np.asarray(picture)[:20].mean() + 50

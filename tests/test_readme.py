@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import click
 import numpy as np
 import pytest
 from PIL import Image
-from samples import ROOT
+from samples import ROOT, run_snippet
 
 from persp_sw.cli import main
 from persp_sw.scene import Scene
@@ -29,17 +27,7 @@ def blocks(language: str) -> list[str]:
 def test_the_python_snippet_makes_a_picture(tmp_path: Path):
     (snippet,) = blocks("python")
     assert len(snippet.strip().splitlines()) <= 12  # "ten lines" and the imports
-    program = tmp_path / "first.py"
-    program.write_text(snippet)
-    done = subprocess.run(
-        [sys.executable, "-W", "error", program],
-        cwd=tmp_path,
-        env={"PYTHONPATH": str(ROOT), "PATH": "", "HOME": str(Path.home())},
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr
+    run_snippet(snippet, tmp_path)
     with Image.open(tmp_path / "first.png") as picture:
         assert picture.size == (400, 400)
         assert np.asarray(picture).max() > 200
