@@ -14,8 +14,8 @@ from ...optics.transfer import TransferFunction
 from ...volume.grid import Volume
 from .eye_paths import Array
 
-# Gaussian profile, voxels. The eye image's pixels are up to two voxels apart behind, where such a blob is
-# aliased by exp(−2·(π·σ/2)²) = 4e-4.
+# Gaussian profile, voxels. The eye image's pixels are at most two voxels apart where blobs are, and at most
+# 2.2 behind them, where no coarser level begins yet: such a blob is aliased by exp(−2·(π·σ/2)²) = 4e-4.
 SIGMA = 1.25
 _REACH = 2.5 * SIGMA  # of the window in which a blob is measured
 _MARGIN = 5 * SIGMA
