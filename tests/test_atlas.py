@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 from samples import fails, run
 from tolerances import FLOAT32_PICTURE, PLAIN_ORDER
 
@@ -195,6 +195,21 @@ def test_a_strip_shows_ours_the_reference_and_the_difference():
     assert (panels[1] == (0, 0, 255)).all()
     assert panels[2][: width // 2].max() <= 4 and panels[2][width // 2 :].min() > 100
     assert strip_rgb(Strip("alone", ours)).shape[1] == 2 * 8 + width
+
+
+def test_the_font_has_all_letters_of_the_captions(monkeypatch: pytest.MonkeyPatch):
+    captions, draw = {}, ImageDraw.ImageDraw.text
+
+    def text(self, place, caption, *rest, **more):
+        captions[caption] = more.get("font") or self.getfont()
+        return draw(self, place, caption, *rest, **more)
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "text", text)
+    strip_rgb(Strip("", picture(1, 0, 0, 1), picture(0, 1, 0, 1), gain=1e4))
+    assert {"ours", "reference", "difference times 10000"} <= set(captions)
+    for caption, font in captions.items():
+        no_glyph = bytes(font.getmask("\uffff"))
+        assert all(bytes(font.getmask(letter)) != no_glyph for letter in caption)
 
 
 def test_a_given_difference_is_shown_in_place_of_the_computed_one():

@@ -46,7 +46,7 @@ def strip_rgb(strip: Strip) -> NDArray[np.uint8]:
     elif strip.reference is not None:
         pair = large(strip.ours), large(strip.reference)
     if pair is not None:
-        panels.append((f"difference x {strip.gain:g}", images.error_map(*pair, 1 / strip.gain)[0]))
+        panels.append((f"difference times {strip.gain:g}", images.error_map(*pair, 1 / strip.gain)[0]))
     return _side_by_side(panels)
 
 
