@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import samples
 from click.testing import CliRunner
 from data_folder import DATA
 from rigs import CONFIGS
@@ -95,6 +96,30 @@ def test_where_time_begins_and_how_fast_it_goes(files):
     path = str(files / "path.csv")
     said = run(files, "--path", path, "--frames", "1", "--rate", "5", "--start", "0.3")
     np.testing.assert_allclose(said["head"], [0.25, 1.6, 0.8], atol=1e-9)
+
+
+def test_missing_voxels_are_said_and_no_others(files):
+    data = samples.ball(dtype=np.float32)
+    arguments = (
+        "cave",
+        files / "rig.toml",
+        files / "some.npy",
+        "--offscreen",
+        "--frames",
+        1,
+        "-o",
+        files / "out",
+    )
+    warnings = []
+    for missing in (0, 2):
+        data[:missing] = np.nan
+        np.save(files / "some.npy", data)
+        result = samples.run(*arguments, "--json")
+        assert result.exit_code == 0, result.output
+        assert json.loads(result.stdout)["timed_frames"] == 1
+        warnings.append(result.stderr)
+    assert warnings[0] == ""
+    assert f"warning: {2 * 24 * 24} of 13824 voxels (8.33 %) are NaN or infinite" in warnings[1]
 
 
 def test_separate_pictures_are_timed_as_well(files):

@@ -14,6 +14,7 @@ from click.core import ParameterSource
 from persp_sw.commands.options import (
     json_option,
     open_scene,
+    say_missing_voxels,
     setting_options,
     settings_for,
     tf_option,
@@ -136,6 +137,7 @@ def cave(
     folder = psw.images.output_folder(out) if offscreen else Path(out)
     with progress_bars() as progress:
         shown = open_scene(scene, progress, **keys)
+        say_missing_voxels(shown.volume)
         if click.get_current_context().get_parameter_source("quality") is not ParameterSource.COMMANDLINE:
             quality = chosen.quality.quality
         settings = settings_for(shown, quality, samples, residual, threads)
