@@ -85,10 +85,14 @@ def test_error_falls_with_quality_and_samples():
     assert errors[-1] > 53  # rms 2e-3
 
 
-def test_opaque_functions_are_preintegrated_of_their_own_accord():
+def test_functions_that_hide_more_than_half_are_preintegrated_of_their_own_accord():
     volume = synthetic_ct(48)
     view = view_of(volume, DIRECTIONS[0], size=(64, 64))
-    for points, opaque in ((SMOOTH, False), ([*SURFACE[:2], (130, (0.9, 0.7, 0.5), 1.0)], True)):
+    bounds = [([*SURFACE[:2], (130, (0.9, 0.7, 0.5), most)], most > 0.5) for most in (0.5, 0.51, 1.0)]
+    for points, opaque in (
+        (SMOOTH, False),
+        *bounds,
+    ):  # a sample is as long as the unit
         renderer = Renderer(volume, TransferFunction(points))
         picture = renderer.render(view)
         assert renderer.last["samples_per_interval"] == 1

@@ -87,7 +87,7 @@ _SETTING_OPTIONS = [
     click.option(
         "--samples",
         type=click.Choice(["1", "2", "4"]),
-        help="Samples from slice to slice; by default 2 where one can be opaque, else 1.",
+        help="Samples from slice to slice; by default 1, pre-integrated where one can hide more than half.",
     ),
     click.option(
         "--residual", type=float, default=0.005, show_default=True, help="Rays stop at this transparency."
