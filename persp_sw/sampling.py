@@ -26,10 +26,12 @@ def choose_sampling(settings: Settings, classification: Classification, volume: 
     """What `settings` say, or, where they leave it open, what serves this transfer function best.
 
     Where one sample can hide more than half, what it misses shows: one pre-integrated sample then is as good
-    as two to four others, at about the time of two (`docs/performance.md`). Elsewhere one plain sample does.
+    as two to four others, at about the time of two (`docs/performance.md`). It is used where voxels have no
+    value, too: its samples lie in the cells that are left out for them, plain ones on the slices between.
+    Elsewhere one plain sample does.
     """
     preintegrated = settings.preintegrated
     if preintegrated is None:
         opaque = classification.largest_extinction * max(volume.spacing) > OPAQUE_DEPTH
-        preintegrated = opaque and settings.samples_per_interval is None
+        preintegrated = settings.samples_per_interval is None and (opaque or volume.nonfinite > 0)
     return Sampling(settings.samples_per_interval or 1, preintegrated)

@@ -23,7 +23,7 @@ class Settings:
     preintegrated
         Every scalar on a ray counts, not only those at samples: each sample takes the transfer function's
         mean over the scalars that its piece of the ray runs through. None: where the transfer function can
-        hide more than half within an interval and `samples_per_interval` is None, too.
+        hide more than half within an interval, or voxels are NaN, and `samples_per_interval` is None, too.
     residual
         A ray stops when no more than this transparency is left, 0 … 0.5. The picture's error is at most this.
     single_face_tangent

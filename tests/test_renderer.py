@@ -4,11 +4,12 @@ import logging
 
 import numpy as np
 import pytest
-from tolerances import FLOAT32_IMAGE, PICTURE_SMOOTH_DB, PICTURE_SURFACE_DB
+from tolerances import CLOSED_FORM, FLOAT32_IMAGE, PICTURE_SMOOTH_DB, PICTURE_SURFACE_DB
 from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import Eye, Regions, Renderer, Settings, TransferFunction, View, Volume, Wall, reference
 from persp_sw.errors import SettingsError
+from persp_sw.measure.atlas.compositing import faces_of
 from persp_sw.measure.metrics import compare, psnr
 from persp_sw.volume.phantoms import synthetic_ct
 
@@ -186,8 +187,23 @@ def test_voxels_that_are_nan_are_transparent_in_picture_and_reference():
     view = view_of(volume, DIRECTIONS[0], size=(64, 64))
     picture = renderer.render(view)
     assert np.isfinite(picture).all()
-    # Cells (8 voxels) with a NaN corner are transparent; slices see half of such a cell as whole.
     assert psnr(picture, reference.render(volume, renderer.transfer, view)) > PICTURE_SURFACE_DB
+
+
+def test_cells_with_a_voxel_that_is_nan_are_left_out_wholly(rng):
+    """As the closed form of what is left; samples on slices would take half of such a cell as whole."""
+    data = np.full((9, 9, 9), 100, np.float32)
+    data[tuple(rng.integers(0, 9, (3, 12)))] = np.nan
+    renderer = Renderer(Volume(data), TransferFunction([(100, (1, 1, 1), 0.3)], 1.0), Settings(residual=0))
+    view = View.look_at((4.2, 4.3, -3000), (4.2, 4.3, 4), (0, 1, 0), 0.2, (32, 32))
+    ((face, rays),) = faces_of(renderer.composite(view.eye, [view.wall]))
+    truth = reference.render(renderer.volume, renderer.transfer, rays)
+    directions = rays.directions()
+    across = (view.eye.position + 3004 / directions[..., 2:] * directions)[..., :2]
+    within = (np.abs(across - np.rint(across)) > 0.02).all(-1)  # rays that stay in their column of cells
+    assert within.sum() > 100 and np.unique(truth[within, 3].round(6)).size > 4
+    assert np.abs(face - truth)[within].max() < CLOSED_FORM
+    assert renderer.last["preintegrated"]
 
 
 def test_a_marker_lands_where_it_is_projected(rng):

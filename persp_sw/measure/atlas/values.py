@@ -20,8 +20,8 @@ from ..metrics import max_error
 from .case import Case, Finding, Progress, Scale, Strip
 from .face_views import TIMES_MIDPOINTS, WHY_TIMES_MIDPOINTS, face_view, judged_faces, rms_errors
 
-# Slices beside a voxel without a value stand for half an interval of a cell that has it for a corner, on
-# either side of it.
+# Plain samples on slices beside a voxel without a value stand for half an interval of a cell that has it for
+# a corner, on either side of it.
 BESIDE_A_GAP = 1.0
 
 _COLOUR = np.array([0.9, 0.6, 0.3])
@@ -205,7 +205,7 @@ def miscounted(n: int) -> int:
     return abs(Volume(values).nonfinite - int(np.count_nonzero(~np.isfinite(values))))
 
 
-def shown_in_gaps(samples_per_interval: int) -> float:
+def shown_in_gaps(samples_per_interval: int | None = None) -> float:
     """Most of a ray, in voxels, that shows although it is in a cell with a corner without a value."""
     data = np.full((9, 9, 9), 1, np.float32)
     data[4, 4, 4] = np.nan
@@ -292,13 +292,19 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
             "counted by the volume; info, render, view and cave say how many",
         ),
         Finding(
-            "voxels of a ray that show beside a voxel without a value, one sample an interval",
+            "voxels of a ray that show beside a voxel without a value",
+            shown_in_gaps(),
+            0.01,
+            "none: by default samples then lie in cells, not on slices; 1 % for slant and float32",
+        ),
+        Finding(
+            "the same where one plain sample an interval is asked for",
             shown_in_gaps(1),
             BESIDE_A_GAP + 0.01,
             "½ on either side: a slice stands for half an interval beyond it; 1 % for slant and float32",
         ),
         Finding(
-            "the same with two samples an interval",
+            "the same with two plain samples an interval",
             shown_in_gaps(2),
             BESIDE_A_GAP / 2 + 0.01,
             "¼ on either side",
