@@ -206,6 +206,35 @@ def test_cells_with_a_voxel_that_is_nan_are_left_out_wholly(rng):
     assert renderer.last["preintegrated"]
 
 
+@pytest.mark.parametrize("preintegrated", [False, True])
+@pytest.mark.parametrize("exponent", [-149, -143, -129, -106, -50, 60, 90, 125])  # 1e-44 … 3e38
+def test_values_of_any_size_are_told_apart(exponent, preintegrated, rng):
+    """Values times a power of two, and the function's, too: not a bit changes, denormal numbers neither."""
+    steps = rng.integers(-7, 8, (7, 8, 9)).astype(np.float32)
+    points = [(-3, (0, 0, 1), 0.0), (1, (0, 1, 0), 0.4), (4, (1, 0, 0), 0.1), (7, (1, 1, 1), 0.4)]
+    pictures = []
+    for size in (0, exponent):
+        volume = Volume(np.ldexp(steps, size))
+        transfer = TransferFunction([(float(np.ldexp(v, size)), c, a) for v, c, a in points], 1.0)
+        renderer = Renderer(volume, transfer, Settings(preintegrated=preintegrated))
+        pictures.append(renderer.render(view_of(volume, DIRECTIONS[0], size=(32, 32))))
+    assert pictures[0].max() > 0.5
+    np.testing.assert_array_equal(*pictures)
+
+
+@pytest.mark.parametrize("width", [1e-30, 1e-36, 1e-40, 1e-44, 1e-310])
+def test_a_rise_too_narrow_for_float32_is_a_step(width, rng):
+    """What lies more than 1e-38 below or above it is as where it is wider."""
+    volume = Volume(rng.integers(-2, 3, (7, 8, 9)).astype(np.float32))
+    pictures = []
+    for rise in (1e-20, width):
+        points = [(0, (0, 0, 1), 0.0), (rise, (0, 1, 0), 0.4)]
+        renderer = Renderer(volume, TransferFunction(points, 1.0), Settings(preintegrated=False))
+        pictures.append(renderer.render(view_of(volume, DIRECTIONS[0], size=(32, 32))))
+    assert pictures[0].max() > 0.5
+    assert np.abs(pictures[0] - pictures[1]).max() < FLOAT32_IMAGE
+
+
 def test_a_marker_lands_where_it_is_projected(rng):
     """A bright voxel's centroid, through any pose, is where the projection matrix says."""
     data = np.zeros((21, 23, 25), np.uint8)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..volume.grid import Volume
+from ..volume.lift import lift_exponent
 from .preintegration import Preintegration
 from .transfer import TransferFunction
 
@@ -31,6 +32,8 @@ class Classification:
         to 1 … n.
     seen
         (n + 2,) int64: number of rows with extinction > 0 before each row.
+    origin, scale
+        Of values as `volume.lift` brings them near 1, where kernels can scale them in float32.
 
     Accuracy: nearest entry; the error in value is at most 1 / (2·scale), which is 1/16 of a grey level for
     8-bit volumes and 1/8192 of the interval that the function tells apart for others. Integer values of 8-bit
@@ -45,21 +48,22 @@ class Classification:
     @classmethod
     def of(cls, transfer: TransferFunction, volume: Volume) -> Classification:
         """Sample `transfer`; its opacity unit is the volume's smallest spacing where it has none."""
-        transfer = transfer.with_unit(min(volume.spacing))
+        transfer, lift = transfer.with_unit(min(volume.spacing)), lift_exponent(volume)
         if volume.data.dtype == np.uint8:
             origin, scale, entries = 0.0, float(_PER_LEVEL), 255 * _PER_LEVEL + 1
         else:
             low, high = _told_apart(transfer, volume)
             origin, entries = low, _ENTRIES
             scale = (entries - 1) / (high - low) if high > low else 0.0
-        if not scale <= _LARGEST:  # an interval of denormals: one entry says it all
-            scale = 0.0
+            most = np.ldexp(_LARGEST, lift)
+            if scale > most:  # float32 cannot tell so many of these values apart
+                scale, entries = most, int(np.ceil((high - low) * most)) + 1
         values = origin + np.arange(entries) / scale if scale else np.full(1, origin)
         table = np.zeros((len(values) + 1, 4), np.float32)
         table[1:, :3] = transfer.colour(values)
         table[1:, 3] = np.minimum(transfer.extinction(values), _LARGEST)
         seen = np.concatenate([[0], np.cumsum(table[:, 3] > 0)]).astype(np.int64)
-        return cls(table, seen, origin, scale)
+        return cls(table, seen, float(np.ldexp(origin, lift)), float(np.ldexp(scale, -lift)))
 
     @cached_property
     def integrals(self) -> Preintegration:

@@ -20,6 +20,7 @@ from .transfer import TransferFunction
 Point = tuple[float, str, float]  # value, sRGB colour as rrggbb, opacity per voxel
 
 _VOXELS_ACROSS = 200.0
+_LEAST = 1e-60  # distance of points where values have no size: far below float32's smallest number
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def _fog(h: Histogram) -> Iterable[Point]:
 def _surface(h: Histogram) -> Iterable[Point]:
     """The outer surface, opaque."""
     middle = 0.5 * (h.threshold + h.level(0.3))
-    step = max(0.12 * (middle - h.background), 1e-6 * max(abs(middle), 1e-30))
+    step = max(0.12 * (middle - h.background), 1e-6 * max(abs(middle), _LEAST))
     return [
         (middle - step, "5c3420", 0.0),
         (middle + step, "e0a878", 0.7),
@@ -149,7 +150,7 @@ def make(name: str, volume: Volume, *, why: str = "", histogram: Histogram | Non
         raise TransferFunctionError(f"there is no preset {name!r}; choose one of {', '.join(NAMES)}")
     histogram = histogram or Histogram.of(volume)
     points = _MAKERS[name](histogram)
-    apart = max(2e-3 * (histogram.high - histogram.background), 1e-6 * abs(histogram.high), 1e-30)
+    apart = max(2e-3 * (histogram.high - histogram.background), 1e-6 * abs(histogram.high), _LEAST)
     return Preset(name, why, _transfer(points, _VOXELS_ACROSS / _voxels_across(volume), apart))
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from .grid import Volume
+from .lift import lifted
 from .mip import Levels
 from .runs import RunStore
 from .visibility import Visibility
 
 
 class DetailStore:
-    """One `RunStore` for each level of detail of a volume, made when first asked for.
+    """One `RunStore` for each level of detail of a volume, `lifted`, made when first asked for.
 
     Parameters
     ----------
@@ -33,6 +34,7 @@ class DetailStore:
         stored: Visibility | None = None,
     ):
         self.volume = volume
+        volume = lifted(volume)
         self.levels = Levels(volume, progress)
         self._progress = progress
         self._visibility, self._stored = visibility, stored

@@ -233,6 +233,21 @@ def change_by_denormals(n: int, pixels: int) -> float:
     return max_error(*pictures)
 
 
+def change_by_size(n: int, pixels: int) -> float:
+    """Largest change of a picture when all values, and the function's, are times a power of two.
+
+    Whole values from −7 to 7, so that denormal numbers can hold them: 1e-44, and up to 3e38.
+    """
+    values = np.rint(field(n) * 7).clip(-7, 7).astype(np.float32)
+    pictures = []
+    for exponent in (0, -149, -140, -126, -100, 125):
+        size = np.ldexp(1.0, exponent)
+        volume = Volume(np.ldexp(values, exponent))
+        renderer = Renderer(volume, TransferFunction(smooth_rows(-7 * size, 7 * size)), Settings(residual=0))
+        pictures.append(renderer.render(view_of(volume, pixels)))
+    return max(max_error(pictures[0], other) for other in pictures[1:])
+
+
 def bad_input() -> dict[str, Callable[[], object]]:
     """What must be refused, with a message that says what is wrong."""
     white = (1.0, 1.0, 1.0)
@@ -328,6 +343,12 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
             change_by_denormals(n, pixels),
             0,
             "1e-40 and 0 have the same entry of the table, and weights the same roundings",
+        ),
+        Finding(
+            "values and function times 2^-149 … 2^125, 1e-44 … 3e38: largest change",
+            change_by_size(n, pixels),
+            0,
+            "values of extreme size are brought near 1 by a power of two, which is exact",
         ),
         Finding(
             "bad functions and voxels taken without a word",
