@@ -163,3 +163,13 @@ def test_colours_are_linear():
     assert (value, opacity) == (3.0, 0.5)
     # sRGB 128 / 255 is 0.2159 of the light (IEC 61966-2-1).
     np.testing.assert_allclose(colour, (1, 0.21586, 0), atol=1e-5)
+
+
+@pytest.mark.parametrize("size", [1e-40, 1.0, 1e38])
+def test_values_that_swing_about_their_most_frequent_one_show(size):
+    z, y, x = np.indices((24, 24, 24)) / 23
+    waves = (np.sin(9 * x + 4 * y) + np.sin(8 * y - 5 * z + 1) + np.sin(7 * z + 6 * x * y + 2)) / 3
+    volume = psw.Volume((waves * size).astype(np.float32))
+    assert Histogram.of(volume).threshold < 0.8 * volume.value_range[1]
+    view = psw.View.look_at((40, 30, 60), volume.centre, (0, 1, 0), 40, (32, 32))
+    assert psw.Renderer(volume).render(view)[..., 3].max() > 0.2

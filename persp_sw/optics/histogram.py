@@ -81,7 +81,8 @@ class Histogram:
         if falling:
             threshold = main = background + 0.06 * (high - background)
             if (noise := _spread_below(values, background)) > 0:
-                threshold = main = max(threshold, background + 4 * noise)
+                above_noise = min(background + 4 * noise, background + 0.5 * (high - background))
+                threshold = main = max(threshold, above_noise)  # a field that swings is no noise all the way
         else:
             main = float(centres[top])
             threshold = float(centres[valley]) + 0.1 * (main - float(centres[valley]))
