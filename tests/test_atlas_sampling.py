@@ -111,7 +111,9 @@ def test_point_samples_show_rings(point_samples):
 
 
 def test_point_samples_expose_hidden_colours(point_samples):
-    assert "across the slices" in failing(colour_exposure.exposure_findings(QUICK))
+    failed = failing(colour_exposure.exposure_findings(QUICK))
+    assert "across the slices" in failed
+    assert "two pre-integrated samples" in failed
 
 
 # --- Opacity ----------------------------------------------------------------------------------------------

@@ -59,11 +59,18 @@ def _surplus(picture: NDArray[np.floating], truth: NDArray[np.floating]) -> NDAr
 def exposure_findings(scale: Scale) -> list[Finding]:
     """The hidden colour's surplus behind plane edges, and on a ball beside a plain ray caster's."""
     size = scale.pick((32, 24), (96, 72))
-    across, along, along_casts, strips = [], [], [], []
+    across, along, along_casts, finer, strips = [], [], [], [], []
     for width in scale.pick((1, 3), (1, 2, 3)):
         volume = edge(width)
         for towards in _BEFORE:
-            image = composite(volume, _LAYER, view_towards(volume, towards, size, 1.7, 25.0))
+            view = view_towards(volume, towards, size, 1.7, 25.0)
+            twice = composite(volume, _LAYER, view, samples_per_interval=2, preintegrated=True)
+            finer += [
+                _surplus(picture, reference.render(volume, _LAYER, rays)).max(initial=0.0)
+                for (picture, rays), face in zip(faces_of(twice), twice.faces, strict=True)
+                if face.axis != 0
+            ]
+            image = composite(volume, _LAYER, view)
             for (picture, rays), face in zip(faces_of(image), image.faces, strict=True):
                 truth = reference.render(volume, _LAYER, rays)
                 if face.axis == 0:
@@ -102,6 +109,13 @@ def exposure_findings(scale: Scale) -> list[Finding]:
             "1.5 × a plain ray caster; a piece sees the values of the cell in its middle only",
             strips=(worst,),
             ray_caster=float(max(along_casts)),
+        ),
+        Finding(
+            "colour exposure: most hidden colour through an edge along them, two pre-integrated samples",
+            float(max(finer)),
+            EVEN_WEIGHT,
+            "3/8 voxel behind a cell's border may be missed, 0.15 voxel or more of a layer is left: an "
+            "optical depth of 2: (1 − ln 2) / 2, as across the slices",
         ),
         Finding(
             "colour exposure: mean hidden colour on a ball",
