@@ -47,9 +47,7 @@ def by_metric(findings: list[Finding]) -> dict[str, Finding]:
 
 # What is known to fall short of its goal, by metric; if none of them does, its line is out of date.
 FALLS_SHORT = {
-    "axis-switch": r"popping .*",  # another face brings errors of its own, all at once
     "zoom": r"sharpness at its least, surface",  # a pixel a voxel, magnified
-    "stereo": r"rivalry .*",  # a pixel is so many voxels: another face's are finer before and coarser behind
 }
 
 

@@ -17,7 +17,7 @@ from . import plain
 from .case import Case, Finding, Progress, Scale, Strip
 from .eye_paths import CORNERS, PAIRS, Arc, across_edge, around, through_corner
 from .looks import LOOKS
-from .popping import changes, faces_of, owners, popping, seam_contrast, strips_of_pop
+from .popping import changes, faces_of, owners, popping, seam_contrast, seam_steps, strips_of_pop
 
 _GOAL = "goal: no frame of the path stands out by more than 1.5 ×"
 _BOUND = 1.5
@@ -189,27 +189,25 @@ def _errors(pictures, truths) -> list[NDArray[np.float64]]:
 
 
 def _seams(stage: _Stage) -> Finding:
-    """The worst contrast of a seam in pictures of several faces; NaN if fewer than two show any."""
+    """The contrast of seams in pictures of several faces; NaN if they show too little of any."""
     high = np.array(stage.volume.size) - 1.0
-    measured = []
+    ours, casts, strips = [], [], []
     for eye, centre in _AMID:
         view = View.look_at(high * eye, high * centre, (0.1, 0.2, 1), 95, stage.size)
-        ours, truth = stage.renderer.render(view), reference.render(stage.volume, stage.transfer, view)
+        picture, truth = stage.renderer.render(view), reference.render(stage.volume, stage.transfer, view)
         owner, seen = owners(view, stage.volume), truth[..., 3] > 0
-        value = seam_contrast(ours - truth, owner, seen)
-        if stage.renderer.last["faces"] > 1 and np.isfinite(value):
-            (cast,) = _cast(stage, [view])
-            strip = Strip(f"seams, {stage.look}", ours, truth)
-            measured.append((value, seam_contrast(cast - truth, owner, seen), strip))
-    value, rival, *strips = max(measured, key=lambda one: one[0], default=(np.nan, np.nan))
+        (cast,) = _cast(stage, [view])
+        ours.append(seam_steps(picture - truth, owner, seen))
+        casts.append(seam_steps(cast - truth, owner, seen))
+        strips.append(Strip(f"seams, {stage.look}", picture, truth))
     return Finding(
         f"contrast of seams, {stage.look}",
-        value if len(measured) > 1 else float("nan"),
+        seam_contrast(ours),
         _BOUND,
         "goal: 1.5 × the error's steps between ordinary neighbours within 6 pixels",
         "× ordinary steps",
         strips=strips,
-        ray_caster=rival,
+        ray_caster=seam_contrast(casts),
     )
 
 

@@ -63,8 +63,10 @@ def owners(view: View, volume: Volume) -> NDArray[np.intp]:
     return 2 * axis + (along > 0)
 
 
-def seam_contrast(error: Array, owner: NDArray[np.intp], seen: NDArray[np.bool_]) -> float:
-    """The error's step between neighbouring pixels of two faces, rms, over that of one face's nearby.
+def seam_steps(
+    error: Array, owner: NDArray[np.intp], seen: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Squared steps of the error between neighbouring pixels: of two faces, and of one face's near by.
 
     Parameters
     ----------
@@ -74,10 +76,6 @@ def seam_contrast(error: Array, owner: NDArray[np.intp], seen: NDArray[np.bool_]
         (h, w), see `owners`.
     seen
         (h, w): pixels that count.
-
-    Returns
-    -------
-    1 where a seam cannot be told from what is beside it; NaN where too little of one is in the picture.
     """
     across, beside = [], []
     seam = np.zeros(owner.shape, bool)
@@ -90,7 +88,15 @@ def seam_contrast(error: Array, owner: NDArray[np.intp], seen: NDArray[np.bool_]
         both, crosses = s[1:] & s[:-1], o[1:] != o[:-1]
         across.append(step[both & crosses])
         beside.append(step[both & ~crosses & n[1:] & n[:-1]])
-    one, other = np.concatenate(across), np.concatenate(beside)
+    return np.concatenate(across), np.concatenate(beside)
+
+
+def seam_contrast(steps: Sequence[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> float:
+    """The error's step across seams, rms, over that beside them, of several pictures together.
+
+    1 where a seam cannot be told from what is beside it; NaN where too little of any is in the pictures.
+    """
+    one, other = (np.concatenate(each) for each in zip(*steps, strict=True))
     if min(one.size, other.size) < _ENOUGH:
         return float("nan")
     return float(np.sqrt(one.mean() / other.mean()))
