@@ -468,6 +468,7 @@ def test_voxels_without_value_that_nobody_counts_are_found(monkeypatch):
     assert values.miscounted(24) > 10
 
 
+@pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")
 def test_a_value_that_is_none_and_shows_is_found(few, monkeypatch):
     exact = Classification.of
 

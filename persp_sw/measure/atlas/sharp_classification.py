@@ -86,8 +86,9 @@ def _on_grids(transfer: TransferFunction, grids: tuple[int, ...], size: int) -> 
     for n in grids:
         volume = field(n)
         view = view_towards(volume, (0.2, 0.15, 1.0), (size, size), 1.2, 15.0)
+        # One face for all rays, so that there are slanted ones among them.
         points, pieces = (
-            composite(volume, transfer, view, samples_per_interval=1, preintegrated=on)
+            composite(volume, transfer, view, samples_per_interval=1, preintegrated=on, single_face_tangent=8)
             for on in (False, True)
         )
         rays = face_view(points, 0)
