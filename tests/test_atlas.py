@@ -217,6 +217,18 @@ def test_a_given_difference_is_shown_in_place_of_the_computed_one():
     assert shown[1][100, -100].sum() > shown[0][100, -100].sum() + 300
 
 
+def test_the_shear_warp_of_2001_is_shown_beside_with_its_own_difference():
+    ours, truth = picture(1, 0, 0, 1), picture(0, 0, 1, 1)
+    rgb = strip_rgb(Strip("three", ours, truth, gain=1, single_axis=picture(0, 1, 0, 1)))
+    width = 12 * 20
+    assert rgb.shape[1] == 6 * 8 + 5 * width
+    panels = [rgb[22 + 100, 8 + n * (8 + width) :][:width].astype(int) for n in range(5)]
+    assert (panels[3] == (0, 255, 0)).all()
+    assert panels[4].min() > 100  # it differs everywhere
+    alike = strip_rgb(Strip("equal", ours, truth, gain=1, single_axis=truth))
+    assert alike[22 + 100, 8 + 4 * (8 + width) :][:width].max() <= 4
+
+
 def test_what_is_no_number_is_magenta():
     ours = picture(0.5, 0.5, 0.5, 1)
     ours[3, 4] = math.nan
@@ -231,8 +243,8 @@ def some_findings(scale, progress):
     progress(0, 1, "some")
     return [
         Finding("first <metric> | a", 0.25, 0.5, "1.5 × a plain ray caster", ray_caster=0.3, strips=[STRIP]),
-        Finding("second", 30.0, 38.0, "a goal", "dB", at_least=True, strips=[STRIP]),
-        Finding("third", math.nan, 1.0, "one"),
+        Finding("second", 30.0, 38.0, "a goal", "dB", at_least=True, strips=[STRIP], single_axis=21.54),
+        Finding("third", math.nan, 1.0, "one", single_axis=math.nan),
     ]
 
 
@@ -260,9 +272,10 @@ def test_the_page_tells_all_and_escapes_it(tmp_path: Path):
     with Image.open(tmp_path / "some-case-1.png") as shown:
         assert shown.mode == "RGB"
 
-    assert "| some-case | first <metric> \\| a | 0.25 | ≤ 0.5 | 0.3 | holds |" in markdown
-    assert "| some-case | second | 30 dB | ≥ 38 dB |  | **fails** |" in markdown
-    assert "| some-case | third | nan | ≤ 1 |  | **fails** |" in markdown
+    assert "| case | metric | value | bound | ray caster | 2001 | verdict |" in markdown
+    assert "| some-case | first <metric> \\| a | 0.25 | ≤ 0.5 | 0.3 |  | holds |" in markdown
+    assert "| some-case | second | 30 dB | ≥ 38 |  | 21.5 | **fails** |" in markdown
+    assert "| some-case | third | nan | ≤ 1 |  | n/a | **fails** |" in markdown
     assert "| broken | broke off: IndexError: list index out of range |" in markdown
     assert "1 of 3 findings of 2 cases hold. 1 broke off." in markdown
     assert markdown.count("(some-case-1.png)") == 1
@@ -270,12 +283,15 @@ def test_the_page_tells_all_and_escapes_it(tmp_path: Path):
 
     assert "first &lt;metric&gt; | a" in page and "<metric>" not in page and "<both>" not in page
     assert page.count('src="some-case-1.png"') == 1
+    assert page.count("<th>2001</th>") == 2  # in the overview and in the case
+    assert page.count('<td class="number">21.5</td>') == 2
     assert 'class="fails"' in page and "Some &lt;case&gt;" in page
 
     entries = json.loads(report)["cases"]
     assert [entry["holds"] for entry in entries] == [True, False, False, False]
     assert entries[0]["ours"] == 0.25 and entries[0]["pictures"] == ["some-case-1.png"]
     assert entries[2]["ours"] is None
+    assert [entry["single_axis"] for entry in entries] == [None, 21.54, None, None]
     assert "IndexError" in entries[3]["fault"]
 
 
@@ -301,7 +317,7 @@ def small_atlas(monkeypatch, tmp_path: Path) -> Path:
 def test_the_command_writes_pictures_pages_and_json(small_atlas: Path):
     result = run("atlas", "--case", "well", "--case", "some-case", "-o", small_atlas)
     assert result.exit_code == 0  # findings that fall short are no fault of the program
-    for word in ("some-case", "second", "38 dB", "fails", "atlas.html"):
+    for word in ("some-case", "second", "≥ 38", "2001", "21.5", "fails", "atlas.html"):
         assert word in result.stdout
     names = {path.name for path in small_atlas.iterdir()}
     assert names == {"atlas.html", "atlas.md", "atlas.json", "some-case-1.png"}

@@ -55,7 +55,8 @@ def atlas(
 ) -> None:
     """Measure how the ways in which volume renderers fail show here: the stability atlas.
 
-    Each case has a metric, its bound and a verdict, and mostly the same metric of a plain ray caster.
+    Each case has metrics with bounds and verdicts, mostly beside those of a plain ray caster and of the
+    single-axis perspective shear-warp of 2001.
     """
     from ..measure.atlas.catalogue import CASES  # numba loads here, not for --help
 
@@ -118,7 +119,7 @@ def _print_overview(outcomes: Sequence[Outcome]) -> None:
     table = Table(box=None, pad_edge=False)
     for name in ("case", "metric"):
         table.add_column(name, overflow="fold")
-    for name in ("value", "bound", "ray caster"):
+    for name in ("value", "bound", "ray caster", "2001"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     before = ""

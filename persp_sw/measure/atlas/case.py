@@ -43,6 +43,8 @@ class Strip:
         (h, w, 4) what they differ by; None: |ours − reference|.
     gain
         What the difference is multiplied by to be shown, where 1 is the brightest.
+    single_axis
+        (h, w, 4) the shear-warp's of 2001, shown beside ours, with its own difference from the reference.
     """
 
     label: str
@@ -50,6 +52,7 @@ class Strip:
     reference: Image | None = None
     error: Image | None = None
     gain: float = 4.0
+    single_axis: Image | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +68,17 @@ class Finding:
     derived
         Where the bound comes from, one line: an equation, or "1.5 × a plain ray caster".
     unit
-        Of value, bound and ray_caster; empty for a pure number.
+        Of value, bound, ray_caster and single_axis; empty for a pure number.
     at_least
         The value must not fall below the bound; else it must not exceed it.
     strips
         Pictures that show it.
     ray_caster
         The same metric of a plain ray caster with as many samples a ray; None: not measured.
+    single_axis
+        The same metric of a single-axis perspective shear-warp without per-ray correction, as published in
+        2001 (`single_axis.py`), on the same views; None: not measured, or the metric has no meaning there;
+        NaN: that method has no picture of such a view.
     """
 
     metric: str
@@ -82,6 +89,7 @@ class Finding:
     at_least: bool = False
     strips: Sequence[Strip] = ()
     ray_caster: float | None = None
+    single_axis: float | None = None
 
     @property
     def holds(self) -> bool:

@@ -17,7 +17,7 @@ from .strips import write_strip
 Pictures = dict[Strip, str]  # file names of strips; a strip is shown once, however many findings it has
 
 _TITLE = "Where methods fail: the stability atlas"
-_COLUMNS = ("case", "metric", "value", "bound", "ray caster", "verdict")
+_COLUMNS = ("case", "metric", "value", "bound", "ray caster", "2001", "verdict")
 _STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; color: #222; max-width: 76rem; margin: 2rem auto }
 h1 { font-size: 1.6rem }
@@ -66,7 +66,7 @@ def report_of(outcomes: Sequence[Outcome], pictures: Pictures, about: dict[str, 
     for outcome in outcomes:
         case = {"name": outcome.case.name, "title": outcome.case.title}
         if outcome.fault:
-            unmeasured = dict.fromkeys(("metric", "ours", "bound", "ray_caster"))
+            unmeasured = dict.fromkeys(("metric", "ours", "bound", "ray_caster", "single_axis"))
             entries.append(case | unmeasured | {"holds": False, "fault": outcome.fault})
         for finding in outcome.findings:
             entries.append(
@@ -78,6 +78,7 @@ def report_of(outcomes: Sequence[Outcome], pictures: Pictures, about: dict[str, 
                     "bound": _finite(finding.bound),
                     "at_least": finding.at_least,
                     "ray_caster": _finite(finding.ray_caster),
+                    "single_axis": _finite(finding.single_axis),
                     "derived": finding.derived,
                     "holds": finding.holds,
                     "pictures": [pictures[strip] for strip in finding.strips],
@@ -89,25 +90,32 @@ def report_of(outcomes: Sequence[Outcome], pictures: Pictures, about: dict[str, 
 
 
 def overview(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
-    """Rows of the overview table: case, metric, value, bound, ray caster, verdict."""
+    """Rows of the overview table: case, metric, value, bound, ray caster, 2001, verdict."""
     rows = []
     for outcome in outcomes:
         if outcome.fault:
-            rows.append((outcome.case.name, f"broke off: {outcome.fault}", "", "", "", "fails"))
+            rows.append((outcome.case.name, f"broke off: {outcome.fault}", "", "", "", "", "fails"))
         for finding in outcome.findings:
             rows.append((outcome.case.name, finding.metric, *figures(finding)))
     return rows
 
 
-def figures(finding: Finding) -> tuple[str, str, str, str]:
-    """Value, bound, ray caster and verdict of a finding, for people."""
-    caster = finding.ray_caster
+def figures(finding: Finding) -> tuple[str, str, str, str, str]:
+    """Value with its unit, bound, ray caster, the method of 2001 and the verdict of a finding, for people."""
     return (
         number_text(finding.value, finding.unit),
-        ("≥ " if finding.at_least else "≤ ") + number_text(finding.bound, finding.unit),
-        "" if caster is None else number_text(caster, finding.unit),
+        ("≥ " if finding.at_least else "≤ ") + number_text(finding.bound),
+        _rival_text(finding.ray_caster),
+        _rival_text(finding.single_axis),
         "holds" if finding.holds else "fails",
     )
+
+
+def _rival_text(value: float | None) -> str:
+    """Nothing where it was not measured; n/a where that method has no picture to measure."""
+    if value is None:
+        return ""
+    return "n/a" if math.isnan(value) else number_text(value)
 
 
 def number_text(value: float, unit: str = "") -> str:
@@ -177,19 +185,19 @@ def _html_table(head: Sequence[str], rows: Sequence[str]) -> str:
 
 def _html_row(row: Sequence[str], link: str = "", note: str = "") -> str:
     """A table's row; the first cell with a link, the metric with a note below it."""
-    *texts, value, bound, caster, verdict = map(html.escape, row)
+    *texts, value, bound, caster, published, verdict = map(html.escape, row)
     if link:
         texts[0] = f'<a href="{html.escape(link)}">{texts[0]}</a>'
     if note:
         texts[-1] += f'<br><span class="derived">bound: {html.escape(note)}</span>'
     cells = [f"<td>{text}</td>" for text in texts]
-    cells += [f'<td class="number">{text}</td>' for text in (value, bound, caster)]
+    cells += [f'<td class="number">{text}</td>' for text in (value, bound, caster, published)]
     return f'<tr>{"".join(cells)}<td class="{verdict}">{verdict}</td></tr>'
 
 
 def _derivations(outcome: Outcome) -> Iterator[str]:
     for finding in outcome.findings:
-        value, bound, _, verdict = figures(finding)
+        value, bound, *_, verdict = figures(finding)
         yield f"{finding.metric}: {value}, {bound}, {verdict}. Bound: {finding.derived}"
 
 
@@ -210,7 +218,9 @@ def _made_by(about: dict[str, Any]) -> str:
     size = "small sizes" if about["quick"] else "full sizes"
     return (
         f"Made by persp-sw {machine['versions']['persp_sw']} atlas, {size}, on {machine['processor']}, "
-        f"{machine['cores']} cores. Ray caster: as many samples on each ray, in equal steps."
+        f"{machine['cores']} cores. Ray caster: as many samples on each ray, in equal steps. 2001: a "
+        "single-axis perspective shear-warp without correction per ray, as published in 2001; n/a: it has no "
+        "picture of such views."
     )
 
 

@@ -27,26 +27,31 @@ def write_strip(strip: Strip, path: Path) -> Path:
 
 
 def strip_rgb(strip: Strip) -> NDArray[np.uint8]:
-    """(h, w, 3) sRGB: ours | reference | difference with its scale, each with a caption.
+    """(h, w, 3) sRGB: ours | reference | difference with its scale, each with a caption; then that of 2001.
 
     Pixels that are no numbers are magenta. In the difference, what is 1 / gain or more is brightest.
     """
     height, width = strip.ours.shape[:2]
-    factor = max(1, min(-(-_LEAST_HEIGHT // height), _MOST_WIDTH // (3 * width)))
+    columns = 3 if strip.single_axis is None else 5
+    factor = max(1, min(-(-_LEAST_HEIGHT // height), _MOST_WIDTH // (columns * width)))
 
     def large(image: ArrayLike) -> NDArray[np.float64]:
         return np.asarray(image, np.float64).repeat(factor, 0).repeat(factor, 1)
 
+    def difference(one: ArrayLike, other: ArrayLike, caption: str) -> Panel:
+        return f"{caption} times {strip.gain:g}", images.error_map(large(one), large(other), 1 / strip.gain)[0]
+
     panels = [("ours", _shown(large(strip.ours)))]
     if strip.reference is not None:
         panels.append(("reference", _shown(large(strip.reference))))
-    pair = None
     if strip.error is not None:
-        pair = large(strip.error), np.zeros((height * factor, width * factor, 4))
+        panels.append(difference(strip.error, np.zeros_like(strip.error), "difference"))
     elif strip.reference is not None:
-        pair = large(strip.ours), large(strip.reference)
-    if pair is not None:
-        panels.append((f"difference times {strip.gain:g}", images.error_map(*pair, 1 / strip.gain)[0]))
+        panels.append(difference(strip.ours, strip.reference, "difference"))
+    if strip.single_axis is not None:
+        panels.append(("single axis, 2001", _shown(large(strip.single_axis))))
+        if strip.reference is not None:
+            panels.append(difference(strip.single_axis, strip.reference, "its difference"))
     return _side_by_side(panels)
 
 
