@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ... import reference
 from ...optics.transfer import TransferFunction
 from ...volume.grid import Volume
-from . import plain
+from . import plain, single_axis
 from .case import Finding, Scale, Strip
 from .compositing import composite, faces_of, view_towards
 
@@ -60,6 +60,7 @@ def exposure_findings(scale: Scale) -> list[Finding]:
     """The hidden colour's surplus behind plane edges, and on a ball beside a plain ray caster's."""
     size = scale.pick((32, 24), (96, 72))
     across, along, along_casts, finer, strips = [], [], [], [], []
+    published: dict[bool, list[NDArray[np.floating]]] = {True: [], False: []}  # whether across the slices
     for width in scale.pick((1, 3), (1, 2, 3)):
         volume = edge(width)
         for towards in _BEFORE:
@@ -83,6 +84,9 @@ def exposure_findings(scale: Scale) -> list[Finding]:
                 along_casts.append(_surplus(cast, truth).mean())
                 label = f"a layer along the slices, edge {width} wide, from {towards}"
                 strips.append(Strip(label, picture, truth.astype(np.float32), gain=1.0))
+            found = single_axis.composite(volume, _LAYER, view)
+            truth = reference.render(volume, _LAYER, found.rays)
+            published[found.axis == 0].append(_surplus(found.pixels, truth))
     worst = strips[int(np.argmax(along))]
     strips = []
     volume = ball(scale.pick(25, 49))
@@ -97,12 +101,15 @@ def exposure_findings(scale: Scale) -> list[Finding]:
             Strip(f"a hidden colour: {name}", shown, truth.astype(np.float32), gain=1.0)
             for name, shown in (("ours", picture), ("plain ray caster", cast))
         ]
+    ((pixels, rays),) = single_axis.faces_of(volume, _LAYER, view)
+    exposed = _surplus(pixels, reference.render(volume, _LAYER, rays)).mean()
     return [
         Finding(
             "colour exposure: most hidden colour through an edge across the slices",
             float(max(across)),
             EVEN_WEIGHT,
             "(1 − ln 2) / 2: an opaque piece's colour is that of its first two optical depths, evenly",
+            single_axis=float(max(surplus.max(initial=0.0) for surplus in published[True])),
         ),
         Finding(
             "colour exposure: mean hidden colour through an edge along the slices, worst view",
@@ -111,6 +118,7 @@ def exposure_findings(scale: Scale) -> list[Finding]:
             "1.5 × a plain ray caster; a piece sees the values of the cell in its middle only",
             strips=(worst,),
             ray_caster=float(max(along_casts)),
+            single_axis=float(max(surplus.mean() for surplus in published[False] if surplus.size)),
         ),
         Finding(
             "colour exposure: most hidden colour through an edge along them, two pre-integrated samples",
@@ -126,5 +134,6 @@ def exposure_findings(scale: Scale) -> list[Finding]:
             "1.5 × a plain ray caster",
             strips=strips,
             ray_caster=float(np.concatenate(casts).mean()),
+            single_axis=float(exposed),
         ),
     ]

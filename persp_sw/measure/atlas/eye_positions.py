@@ -19,6 +19,8 @@ from ...optics.transfer import TransferFunction
 from ...renderer import Renderer
 from ...settings import Settings
 from ...volume.grid import Volume
+from ..metrics import psnr
+from . import single_axis
 from .case import Case, Finding, Progress, Scale, Strip
 from .face_views import judged_faces, rms_errors
 from .plain import cast
@@ -61,6 +63,7 @@ class Crossing:
     to_the_end: list[Image]  # ours where no ray stops early
     truth: list[NDArray[np.float64]]
     caster: list[Image]
+    published: list[Image]  # of the shear-warp of 2001
     rms: tuple[float, float]  # on the faces at the place, of ours and of the plain ray caster
 
     def jump(self, pictures: list[Image]) -> float:
@@ -132,6 +135,7 @@ def crossings(scale: Scale, progress: Progress) -> list[Crossing]:
                 [to_the_end.render(view) for view in views],
                 [reference.render(volume, FUNCTION, view, tolerance=1e-7) for view in views],
                 [cast(volume, FUNCTION, view) for view in views],
+                [single_axis.render(volume, FUNCTION, view) for view in views],
                 rms_errors(judged_faces(renderer, views[beside])),
             )
         )
@@ -150,7 +154,9 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
     decibels, casters = -20 * np.log10([c.rms for c in found]).T
     worst = int(np.argmin(np.nan_to_num(decibels)))
     sharpest = max(found, key=lambda c: np.nan_to_num(c.jump(c.to_the_end), nan=np.inf))
-    caster_jump = float(np.max([c.jump(c.caster) for c in found]))
+    caster_jump, jump_of_2001 = (
+        float(np.max([c.jump(getattr(c, name)) for c in found])) for name in ("caster", "published")
+    )
     return [
         Finding("numbers that are NaN or infinite", lost, 0, "none is to be"),
         Finding(
@@ -162,6 +168,7 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
             quantum,
             "2 √3 Δτ: two samples of a ray that fall on the next entry of the table, Δτ its largest step",
             ray_caster=caster_jump,
+            single_axis=jump_of_2001,
             strips=[_change_strip(sharpest)],
         ),
         Finding(
@@ -170,6 +177,7 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
             quantum + residual,
             f"as above + {residual:g}, the transparency at which a ray stops and may do so a sample earlier",
             ray_caster=caster_jump,
+            single_axis=jump_of_2001,
         ),
         Finding(
             "lowest PSNR of the faces at a place",
@@ -179,6 +187,7 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
             unit="dB",
             at_least=True,
             ray_caster=float(casters[worst]),
+            single_axis=float(np.min([psnr(c.published[c.middle], c.truth[c.middle]) for c in found])),
             strips=[
                 Strip(_label(c.place), c.ours[c.middle], c.truth[c.middle].astype(np.float32), gain=20)
                 for c in found

@@ -16,6 +16,7 @@ from ...arrays import Image
 from ...eye_image import EyeImage
 from ...geometry.view import View, Wall
 from ...renderer import Renderer
+from . import single_axis
 from .plain import cast
 
 # Of what varies smoothly along a ray, in intervals h with the slope s at each of its two ends: midpoints of
@@ -57,6 +58,16 @@ def judged_faces(renderer: Renderer, view: View) -> list[JudgedFace]:
     return found
 
 
+def judged_single_axis(renderer: Renderer, view: View) -> list[JudgedFace]:
+    """As `judged_faces`: the shear-warp's of 2001 as `ours`, none where it has no picture of a view."""
+    scene = renderer.volume, renderer.transfer
+    found = []
+    for pixels, rays in single_axis.faces_of(*scene, view, renderer.regions):
+        truth = reference.render(*scene, rays, regions=renderer.regions, tolerance=1e-6).astype(np.float32)
+        found.append(JudgedFace(pixels, truth, cast(*scene, rays, renderer.regions)))
+    return found
+
+
 def rms_errors(faces: Sequence[JudgedFace]) -> tuple[float, float]:
     """Root mean square errors over all pixels and channels: ours, and a plain ray caster's.
 
@@ -69,3 +80,14 @@ def rms_errors(faces: Sequence[JudgedFace]) -> tuple[float, float]:
         for name in ("ours", "truth", "plain")
     )
     return tuple(float(np.sqrt(np.square(image - truth).mean())) for image in (ours, plain))
+
+
+def rms_ratio(ours: float, plain: float) -> float:
+    """The first of `rms_errors` over the second; infinite where the ray caster makes no error at all."""
+    return ours / plain if plain else np.inf
+
+
+def single_axis_ratio(renderer: Renderer, view: View) -> float:
+    """`rms_ratio` of the shear-warp of 2001; NaN where it has no picture of a view."""
+    faces = judged_single_axis(renderer, view)
+    return rms_ratio(*rms_errors(faces)) if faces else np.nan

@@ -14,7 +14,7 @@ from ...optics.transfer import TransferFunction
 from ...renderer import Renderer
 from ...settings import Settings
 from ...volume.grid import Volume
-from . import plain
+from . import plain, single_axis
 from .case import Case, Finding, Progress, Scale, Strip, in_parts
 
 Array = NDArray[np.float64]
@@ -84,8 +84,11 @@ def findings(volume: Volume, views: list[View], times: int) -> list[Finding]:
         renderer = Renderer(volume, _HAZE, Settings(residual=0, level_of_detail=levels))
         pictures[name] = [renderer.render(view) for view in views]
     casts = [plain.cast(volume, _HAZE, view) for view in views]
+    published = [single_axis.render(volume, _HAZE, view) for view in views]
     steady = flicker(truths)
-    ours, without, cast = (flicker(frames) / steady for frames in (*pictures.values(), casts))
+    ours, without, cast, single = (
+        flicker(frames) / steady for frames in (*pictures.values(), casts, published)
+    )
     truth = truths[0].astype(np.float32)
     strips = [Strip(f"{volume.name}, {name}", frames[0], truth) for name, frames in pictures.items()]
     strips.append(Strip(f"{volume.name}, plain ray caster", casts[0], truth))
@@ -101,6 +104,7 @@ def findings(volume: Volume, views: list[View], times: int) -> list[Finding]:
             unit,
             strips=strips,
             ray_caster=cast,
+            single_axis=single,
         ),
         Finding(
             f"{volume.name}: temporal energy with levels of detail over that without",

@@ -15,7 +15,7 @@ from ...optics.transfer import TransferFunction
 from ...renderer import Renderer
 from ...settings import Settings
 from ...volume.grid import Volume
-from . import plain
+from . import plain, single_axis
 from .case import Finding, Scale, Strip
 from .compositing import rms, view_towards
 
@@ -58,7 +58,8 @@ def _regions(volume: Volume, normal: Vector, depth: float) -> Regions:
 
 def _steps(pictures: list[NDArray[np.floating]]) -> _Steps:
     changes = [rms(after - before) for before, after in pairwise(pictures)]
-    return _Steps(max(changes), max(changes) / float(np.median(changes)))
+    most, median = max(changes), float(np.median(changes))
+    return _Steps(most, most / median if median else np.inf)  # from slice to slice most frames change nothing
 
 
 def moving_findings(scale: Scale) -> list[Finding]:
@@ -71,13 +72,14 @@ def moving_findings(scale: Scale) -> list[Finding]:
         for name, normal in _NORMALS.items():
             renderer = Renderer(volume, transfer, Settings(residual=0))
             ours: list[Image] = []
-            truths, casts = [], []
+            truths, casts, published = [], [], []
             for depth in depths:
                 renderer.regions = _regions(volume, normal, float(depth))
                 ours.append(renderer.render(view))
                 truths.append(reference.render(volume, transfer, view, regions=renderer.regions))
                 casts.append(plain.cast(volume, transfer, view, renderer.regions))
-            step, truth, cast = map(_steps, (ours, truths, casts))
+                published.append(single_axis.render(volume, transfer, view, renderer.regions))
+            step, truth, cast, single = map(_steps, (ours, truths, casts, published))
             middle = len(depths) // 2
             strip = Strip(f"{look}, a plane {name}", ours[middle], truths[middle].astype(np.float32))
             found += [
@@ -89,6 +91,7 @@ def moving_findings(scale: Scale) -> list[Finding]:
                     "there are frames a slice",
                     strips=(strip,),
                     ray_caster=cast.largest / truth.largest,
+                    single_axis=single.largest / truth.largest,
                 ),
                 Finding(
                     f"a moving plane {name}, {look}: largest change over the median one",
@@ -96,6 +99,7 @@ def moving_findings(scale: Scale) -> list[Finding]:
                     STANDS_OUT * truth.stands_out,
                     "1.5 × the reference's",
                     ray_caster=cast.stands_out,
+                    single_axis=single.stands_out,
                 ),
             ]
     return found

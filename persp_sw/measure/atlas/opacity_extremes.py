@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Vector
+from ...arrays import Image, Vector
+from ...geometry.view import View
 from ...optics.transfer import MAX_OPACITY, TransferFunction
 from ...settings import Settings
 from ...volume import phantoms
 from ...volume.grid import Volume
 from ..exact import shown_part
-from . import plain
+from . import plain, single_axis
 from .case import Case, Finding, Part, Progress, Scale, Strip, in_parts
 from .compositing import DIRECTIONS, composite, faces_of, homogeneous, view_towards
 from .thin_sheets import sheet_findings
@@ -40,6 +43,14 @@ COLOUR = (0.9, 0.6, 0.3)
 SLICES = 2048
 
 
+Faces = Callable[[Volume, TransferFunction, View], Iterable[tuple[Image, View]]]
+
+
+def our_faces(volume: Volume, transfer: TransferFunction, view: View) -> Iterable[tuple[Image, View]]:
+    """The pixels of each face that a view needs, and the view that they are of."""
+    return faces_of(composite(volume, transfer, view))
+
+
 def medium(opacity: float, unit: float = 1.0) -> TransferFunction:
     """One opacity, whatever the value."""
     return TransferFunction([(100.0, COLOUR, opacity)], unit)
@@ -50,14 +61,26 @@ def slab(spacing: float = 1.0) -> Volume:
     return phantoms.constant((17, 13, 15), 100.0, np.diag([spacing, spacing, spacing, 1.0]))
 
 
-def slab_error(volume: Volume, transfer: TransferFunction, directions: tuple[Vector, ...]) -> float:
+def slab_error(
+    volume: Volume, transfer: TransferFunction, directions: tuple[Vector, ...], faces: Faces = our_faces
+) -> float:
     """Largest error of alpha over the faces of several views, relative to the largest alpha."""
     worst = 0.0
     for towards in directions:
-        for picture, rays in faces_of(composite(volume, transfer, view_towards(volume, towards, (48, 36)))):
+        for picture, rays in faces(volume, transfer, view_towards(volume, towards, (48, 36))):
             exact = homogeneous(volume, transfer, rays)[..., 3]
             worst = max(worst, float(np.abs(picture[..., 3] - exact).max() / exact.max()))
     return worst
+
+
+def both_errors(
+    volumes: list[tuple[Volume, TransferFunction, float]], directions: tuple[Vector, ...]
+) -> tuple[float, float]:
+    """Worst `slab_error`, each over its scale: ours, and of the shear-warp of 2001."""
+    return tuple(
+        max(slab_error(volume, transfer, directions, faces) / scale for volume, transfer, scale in volumes)
+        for faces in (our_faces, single_axis.faces_of)
+    )
 
 
 def slab_findings(scale: Scale) -> list[Finding]:
@@ -66,30 +89,43 @@ def slab_findings(scale: Scale) -> list[Finding]:
     faint, dense = (1e-6, 1e-4, 0.01, 0.5), (0.99, 1 - 1e-4, 1 - 1e-6, 1 - 1e-7)
     units = [10.0**power for power in scale.pick((-6, -3, 3, 6), range(-6, 7))]
     derived = "some twenty float32 roundings of 6e-8, and depths to 6e-8 of their interval"
+    thin, thick, scaled, told = (
+        both_errors(volumes, directions)
+        for volumes in (
+            [(slab(), medium(opacity), 1.0) for opacity in faint],
+            [(slab(), medium(opacity), 1.0) for opacity in dense],
+            [(slab(unit), medium(0.1, unit), 1.0) for unit in units],
+            [(slab(), medium(0.1, unit), max(0.1 / unit, 1)) for unit in units],
+        )
+    )
     return [
         Finding(
             "opacity 1e-6 … 0.5 per unit: largest error of a homogeneous box",
-            max(slab_error(slab(), medium(opacity), directions) for opacity in faint),
+            thin[0],
             HOMOGENEOUS,
             derived + "; relative to the largest alpha",
+            single_axis=thin[1],
         ),
         Finding(
             "opacity 0.99 … 1 − 1e-7 per unit: largest error of a homogeneous box",
-            max(slab_error(slab(), medium(opacity), directions) for opacity in dense),
+            thick[0],
             HOMOGENEOUS - ENDS * float(np.log1p(-MAX_OPACITY)),
             "and a ray's ends to 2^-21 voxels each, times the extinction 13.8",
+            single_axis=thick[1],
         ),
         Finding(
             "all lengths times 1e-6 … 1e6: largest error of a homogeneous box",
-            max(slab_error(slab(unit), medium(0.1, unit), directions) for unit in units),
+            scaled[0],
             HOMOGENEOUS,
             derived,
+            single_axis=scaled[1],
         ),
         Finding(
             "opacity unit 1e-6 … 1e6: largest error of a homogeneous box",
-            max(slab_error(slab(), medium(0.1, unit), directions) / max(0.1 / unit, 1) for unit in units),
+            told[0],
             HOMOGENEOUS + ENDS,
             "relative to the largest alpha, and to the extinction per voxel where it is above 1",
+            single_axis=told[1],
         ),
         _held_finding(directions),
     ]
@@ -116,7 +152,7 @@ def _held_finding(directions: tuple[Vector, ...]) -> Finding:
 def fog_findings(scale: Scale) -> list[Finding]:
     """Very many very faint slices, seen along them all."""
     volume = phantoms.constant((5, 5, SLICES), 100.0)
-    ours, casts, strips = [], [], []
+    ours, casts, published, strips = [], [], [], []
     for opacity in scale.pick((1e-6, 1e-3), (1e-6, 1e-5, 1e-4, 1e-3)):
         # From so far that all rays that meet the front leave by the back.
         view = view_towards(volume, (0, 0, 1), (24, 24), 40.0, np.degrees(3 / (40 * SLICES)))
@@ -129,6 +165,10 @@ def fog_findings(scale: Scale) -> list[Finding]:
             ours.append(_relative(picture, exact, whole))
             casts.append(_relative(cast, exact, whole))
             strips.append(Strip(f"{opacity:g} a slice", picture, exact.astype(np.float32), gain=1e4))
+        for picture, rays in single_axis.faces_of(volume, transfer, view):
+            exact = homogeneous(volume, transfer, rays)
+            whole = exact[..., 3] > 0.999 * exact[..., 3].max()
+            published.append(_relative(picture, exact, whole))
     return [
         Finding(
             "2,048 slices of faint fog: largest relative error",
@@ -137,6 +177,7 @@ def fog_findings(scale: Scale) -> list[Finding]:
             "2,048 float32 roundings of 2^-24 of the sum, all one way",
             strips=strips,
             ray_caster=max(casts),
+            single_axis=max(published),
         )
     ]
 

@@ -14,7 +14,7 @@ from ...geometry.view import View
 from ...optics.transfer import TransferFunction
 from ...volume.grid import Volume
 from ..exact import Ball
-from . import plain
+from . import plain, single_axis
 from .case import Case, Finding, Part, Progress, Scale, Strip, in_parts
 from .colour_exposure import exposure_findings
 from .compositing import composite, rms, view_towards
@@ -56,6 +56,7 @@ class _Grid:
     point_samples: float
     preintegrated: float
     ray_caster: float
+    single_axis: float
     strips: tuple[Strip, ...]
 
 
@@ -94,10 +95,13 @@ def _on_grids(transfer: TransferFunction, grids: tuple[int, ...], size: int) -> 
         rays = face_view(points, 0)
         truth = reference.render(volume, transfer, rays, tolerance=TOLERANCE)
         cast = plain.cast(volume, transfer, rays)
+        ((published, its_rays),) = single_axis.faces_of(volume, transfer, view)
+        its_truth = reference.render(volume, transfer, its_rays, tolerance=TOLERANCE)
         pictures = {"point samples": points.face_pixels(0), "pre-integrated": pieces.face_pixels(0)}
         yield _Grid(
             EDGE / (n - 1),
             *(rms(picture - truth) for picture in (*pictures.values(), cast)),
+            rms(published - its_truth),
             tuple(
                 Strip(f"{label}, {n}³", picture, truth.astype(np.float32))
                 for label, picture in pictures.items()
@@ -108,8 +112,9 @@ def _on_grids(transfer: TransferFunction, grids: tuple[int, ...], size: int) -> 
 def order_findings(name: str, transfer: TransferFunction, scale: Scale) -> list[Finding]:
     """Errors of one function on finer and finer grids."""
     grids = list(_on_grids(transfer, GRIDS, scale.pick(16, 48)))
-    spacings, errors, casts = (
-        np.log([getattr(grid, what) for grid in grids]) for what in ("spacing", "preintegrated", "ray_caster")
+    spacings, errors, casts, published = (
+        np.log([getattr(grid, what) for grid in grids])
+        for what in ("spacing", "preintegrated", "ray_caster", "single_axis")
     )
     last = grids[-1]
     return [
@@ -122,6 +127,7 @@ def order_findings(name: str, transfer: TransferFunction, scale: Scale) -> list[
             else "half of first order: a spike weighs by the slope where it is crossed, off by O(h)",
             at_least=True,
             ray_caster=float(np.polyfit(spacings, casts, 1)[0]),
+            single_axis=float(np.polyfit(spacings, published, 1)[0]),
         ),
         Finding(
             f"{name}: pre-integrated error over that of point samples, finest grid",
@@ -136,6 +142,7 @@ def order_findings(name: str, transfer: TransferFunction, scale: Scale) -> list[
             PLAIN * last.ray_caster,
             "1.5 × a plain ray caster",
             ray_caster=last.ray_caster,
+            single_axis=last.single_axis,
         ),
     ]
 
@@ -175,6 +182,8 @@ def ring_findings(scale: Scale) -> list[Finding]:
         Strip(f"rings: {name}", picture, truth.astype(np.float32), gain=32.0)
         for name, picture in faces.items()
     )
+    ((published, its_rays),) = single_axis.faces_of(ball.volume, shell, view)
+    its_truth = reference.render(ball.volume, shell, its_rays, tolerance=TOLERANCE)
     least = ball.radius / 2  # half chord
     reach = float(np.sqrt(ball.radius**2 - least**2))
     points, pieces, cast = (ring_amplitude((face - truth)[..., 3], rays, reach) for face in faces.values())
@@ -186,6 +195,7 @@ def ring_findings(scale: Scale) -> list[Finding]:
             "1.5 × a plain ray caster; variance over radii of the error's mean over each",
             strips=strips,
             ray_caster=cast**2,
+            single_axis=ring_amplitude((published - its_truth)[..., 3], its_rays, reach) ** 2,
         ),
         Finding(
             "rings: pre-integrated amplitude over that of point samples",

@@ -39,7 +39,9 @@ def strip_rgb(strip: Strip) -> NDArray[np.uint8]:
         return np.asarray(image, np.float64).repeat(factor, 0).repeat(factor, 1)
 
     def difference(one: ArrayLike, other: ArrayLike, caption: str) -> Panel:
-        return f"{caption} times {strip.gain:g}", images.error_map(large(one), large(other), 1 / strip.gain)[0]
+        return f"{caption} times {strip.gain:g}", images.error_map(large(one), large(other), 1 / strip.gain)[
+            0
+        ]
 
     panels = [("ours", _shown(large(strip.ours)))]
     if strip.reference is not None:
