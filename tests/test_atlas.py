@@ -245,6 +245,7 @@ def some_findings(scale, progress):
         Finding("first <metric> | a", 0.25, 0.5, "1.5 × a plain ray caster", ray_caster=0.3, strips=[STRIP]),
         Finding("second", 30.0, 38.0, "a goal", "dB", at_least=True, strips=[STRIP], single_axis=21.54),
         Finding("third", math.nan, 1.0, "one", single_axis=math.nan),
+        Finding("pixels lost", 3, 4, "four", "pixels"),
     ]
 
 
@@ -274,10 +275,11 @@ def test_the_page_tells_all_and_escapes_it(tmp_path: Path):
 
     assert "| case | metric | value | bound | ray caster | 2001 | verdict |" in markdown
     assert "| some-case | first <metric> \\| a | 0.25 | ≤ 0.5 | 0.3 |  | holds |" in markdown
-    assert "| some-case | second | 30 dB | ≥ 38 |  | 21.5 | **fails** |" in markdown
+    assert "| some-case | second (dB) | 30 | ≥ 38 |  | 21.5 | **fails** |" in markdown
+    assert "| some-case | pixels lost | 3 | ≤ 4 |  |  | holds |" in markdown  # names its unit
     assert "| some-case | third | nan | ≤ 1 |  | n/a | **fails** |" in markdown
     assert "| broken | broke off: IndexError: list index out of range |" in markdown
-    assert "1 of 3 findings of 2 cases hold. 1 broke off." in markdown
+    assert "2 of 4 findings of 2 cases hold. 1 broke off." in markdown
     assert markdown.count("(some-case-1.png)") == 1
     assert markdown.count("1.5 × a plain ray caster") == 1
 
@@ -288,11 +290,11 @@ def test_the_page_tells_all_and_escapes_it(tmp_path: Path):
     assert 'class="fails"' in page and "Some &lt;case&gt;" in page
 
     entries = json.loads(report)["cases"]
-    assert [entry["holds"] for entry in entries] == [True, False, False, False]
+    assert [entry["holds"] for entry in entries] == [True, False, False, True, False]
     assert entries[0]["ours"] == 0.25 and entries[0]["pictures"] == ["some-case-1.png"]
     assert entries[2]["ours"] is None
-    assert [entry["single_axis"] for entry in entries] == [None, 21.54, None, None]
-    assert "IndexError" in entries[3]["fault"]
+    assert [entry["single_axis"] for entry in entries] == [None, 21.54, None, None, None]
+    assert "IndexError" in entries[4]["fault"]
 
 
 @pytest.mark.parametrize(
@@ -301,7 +303,6 @@ def test_the_page_tells_all_and_escapes_it(tmp_path: Path):
 )
 def test_numbers_have_three_digits(value, text):
     assert number_text(value) == text
-    assert number_text(value, "dB") == text + " dB"
 
 
 # --- The command ------------------------------------------------------------------------------------------
@@ -328,10 +329,10 @@ def test_json_keeps_the_contract(small_atlas: Path):
     assert result.exit_code == 0 and result.stderr == ""
     report = json.loads(result.stdout)
     assert report["quick"] is True and report["holds"] is False
-    assert len(report["cases"]) == 4
+    assert len(report["cases"]) == 5
     for entry in report["cases"]:
         assert {"name", "metric", "bound", "ours", "holds"} <= set(entry)
-    assert report["cases"][3]["ours"] == 1  # of the quick scale
+    assert report["cases"][4]["ours"] == 1  # of the quick scale
     written = json.loads((small_atlas / "atlas.json").read_text())
     assert written["cases"] == report["cases"]
 

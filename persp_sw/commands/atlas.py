@@ -111,20 +111,22 @@ def _print_cases(cases: Sequence[Case], as_json: bool) -> None:
 
 
 def _print_overview(outcomes: Sequence[Outcome]) -> None:
+    from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
 
     from ..measure.atlas.page import overview
 
     table = Table(box=None, pad_edge=False)
-    for name in ("case", "metric"):
-        table.add_column(name, overflow="fold")
+    table.add_column("metric", overflow="fold")
     for name in ("value", "bound", "ray caster", "2001"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("verdict", no_wrap=True)
     before = ""
-    for name, *cells, verdict in overview(outcomes):
+    for name, metric, *cells, verdict in overview(outcomes):
+        if name != before:
+            table.add_row(Text(name, "bold"))
         style = "green" if verdict == "holds" else "bold red"
-        table.add_row(name if name != before else "", *map(Text, cells), Text(verdict, style))
+        table.add_row(Padding(Text(metric), (0, 0, 0, 2)), *map(Text, cells), Text(verdict, style))
         before = name
     console().print(table)

@@ -96,14 +96,19 @@ def overview(outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
         if outcome.fault:
             rows.append((outcome.case.name, f"broke off: {outcome.fault}", "", "", "", "", "fails"))
         for finding in outcome.findings:
-            rows.append((outcome.case.name, finding.metric, *figures(finding)))
+            rows.append((outcome.case.name, with_unit(finding), *figures(finding)))
     return rows
 
 
+def with_unit(finding: Finding) -> str:
+    """The metric, and its unit in brackets unless the metric names it."""
+    return finding.metric if finding.unit in finding.metric else f"{finding.metric} ({finding.unit})"
+
+
 def figures(finding: Finding) -> tuple[str, str, str, str, str]:
-    """Value with its unit, bound, ray caster, the method of 2001 and the verdict of a finding, for people."""
+    """Value, bound, ray caster, the method of 2001, all without unit, and the verdict of a finding."""
     return (
-        number_text(finding.value, finding.unit),
+        number_text(finding.value),
         ("≥ " if finding.at_least else "≤ ") + number_text(finding.bound),
         _rival_text(finding.ray_caster),
         _rival_text(finding.single_axis),
@@ -118,12 +123,11 @@ def _rival_text(value: float | None) -> str:
     return "n/a" if math.isnan(value) else number_text(value)
 
 
-def number_text(value: float, unit: str = "") -> str:
-    """Three significant digits, whole numbers below a million in full, and the unit."""
+def number_text(value: float) -> str:
+    """Three significant digits, whole numbers below a million in full."""
     value = float(value)
     whole = math.isfinite(value) and (value == int(value) or abs(value) >= 1000) and abs(value) < 1e6
-    text = f"{value:.0f}" if whole else f"{value:.3g}"
-    return f"{text} {unit}".rstrip()
+    return f"{value:.0f}" if whole else f"{value:.3g}"
 
 
 def as_markdown(outcomes: Sequence[Outcome], pictures: Pictures, about: dict[str, Any]) -> str:
@@ -169,7 +173,7 @@ def as_html(outcomes: Sequence[Outcome], pictures: Pictures, about: dict[str, An
         if outcome.fault:
             parts.append(f'<p class="fails">Broke off: {html.escape(outcome.fault)}</p>')
         rows = [
-            _html_row((finding.metric, *figures(finding)), note=finding.derived)
+            _html_row((with_unit(finding), *figures(finding)), note=finding.derived)
             for finding in outcome.findings
         ]
         parts.append(_html_table(_COLUMNS[1:], rows) if rows else "")
@@ -198,7 +202,7 @@ def _html_row(row: Sequence[str], link: str = "", note: str = "") -> str:
 def _derivations(outcome: Outcome) -> Iterator[str]:
     for finding in outcome.findings:
         value, bound, *_, verdict = figures(finding)
-        yield f"{finding.metric}: {value}, {bound}, {verdict}. Bound: {finding.derived}"
+        yield f"{with_unit(finding)}: {value}, {bound}, {verdict}. Bound: {finding.derived}"
 
 
 def _strips(outcome: Outcome) -> list[Strip]:
