@@ -172,7 +172,7 @@ def _accuracy(way: _Way) -> list[Finding]:
                 at_least=True,
                 strips=[Strip(f"{gaps[worst]:.3g} voxels from the surface", pictures[worst], truths[worst])],
                 ray_caster=rival,
-                single_axis=float(np.min(published)),
+                single_axis=min((value for value in published if not np.isnan(value)), default=np.nan),
             )
         )
     return found
