@@ -7,11 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ...arrays import Image
 from ...eye_image import EyeImage
 from ...geometry.seams import reach_of
 from ...geometry.view import View
 from ...renderer import Renderer
 from ...settings import Settings
+from . import single_axis
 from .blobs import THIN, Blobs
 from .case import Case, Finding, Progress, Scale, Strip
 from .eye_paths import CORNERS, PAIRS, Arc, Array, across_edge, around, through_corner
@@ -50,9 +52,34 @@ class _Heads:
 
     def rivalry(self, views: Sequence[View], images: Sequence[EyeImage]) -> Array:
         """(n,): how much brighter a blob is to one eye than to the other, as a part of what it should be."""
-        pairs = zip(views, images, strict=True)
-        left, right = (self.blobs.contrasts(view, self.renderer.warp(image, view)) for view, image in pairs)
+        return self.rivalry_of(
+            views, [self.renderer.warp(image, view) for view, image in zip(views, images, strict=True)]
+        )
+
+    def rivalry_of(self, views: Sequence[View], pictures: Sequence[Image]) -> Array:
+        """`rivalry` of pictures."""
+        pairs = zip(views, pictures, strict=True)
+        left, right = (self.blobs.contrasts(view, picture) for view, picture in pairs)
         return np.abs(left - right)
+
+    def switch_of_2001(self, arc: Arc) -> tuple[View, View] | None:
+        """The first heads of an arc between whose eyes the axis of 2001 changes; None: it does not."""
+        for degrees in np.arange(-45.0, 45.0):
+            views = self.views(arc, degrees)
+            axes = {single_axis.principal_axis(self.blobs.volume, view.eye.position) for view in views}
+            if len(axes) == 2:
+                return views
+        return None
+
+    def published(self, views: Sequence[View]) -> list[Image]:
+        """What both eyes see of the shear-warp of 2001."""
+        return [single_axis.render(self.blobs.volume, THIN, view) for view in views]
+
+    def published_disparity_errors(self, views: Sequence[View]) -> Array:
+        """`disparity_errors` of the shear-warp of 2001."""
+        pairs = zip(views, self.published(views), strict=True)
+        left, right = (self.blobs.displacements(view, picture) for view, picture in pairs)
+        return np.linalg.norm(left - right, axis=1)
 
     def disparity_errors(
         self, views: Sequence[View], images: Sequence[EyeImage]
@@ -72,10 +99,15 @@ def _worst(values: Sequence[float] | NDArray[np.float64]) -> float:
     return float(known.max()) if known.size else float("nan")
 
 
-def _disparity_finding(metric: str, measured: list[tuple[Array, list[Strip]]]) -> Finding:
+def _disparity_finding(
+    metric: str, measured: list[tuple[Array, list[Strip]]], published: list[Array]
+) -> Finding:
     worst = [_worst(errors) for errors, _ in measured]
     strips = measured[int(np.nanargmax(worst))][1] if np.isfinite(worst).any() else []
-    return Finding(metric, _worst(worst), _DISPARITY, _DISPARITY_DERIVED, "pixels", strips=strips)
+    rival = _worst([_worst(errors) for errors in published])
+    return Finding(
+        metric, _worst(worst), _DISPARITY, _DISPARITY_DERIVED, "pixels", strips=strips, single_axis=rival
+    )
 
 
 def _at_seams(heads: _Heads, scale: Scale, progress: Progress) -> list[Finding]:
@@ -95,6 +127,9 @@ def _at_seams(heads: _Heads, scale: Scale, progress: Progress) -> list[Finding]:
             images = heads.images(views, one_axis)
             if len({faces_of(image.faces) for image in images}) == 1:
                 same.append(_worst(heads.rivalry(views, images)))
+    at_its_own = [views for arc in arcs if (views := heads.switch_of_2001(arc))]
+    published = [_worst(heads.rivalry_of(views, heads.published(views))) for views in at_its_own]
+    published_disparity = [heads.published_disparity_errors(views) for views in at_its_own]
     return [
         Finding(
             "heads whose eyes both see several axes",
@@ -110,18 +145,20 @@ def _at_seams(heads: _Heads, scale: Scale, progress: Progress) -> list[Finding]:
             _BOUND * _worst(same),
             f"1.5 × both eyes' whole pictures along one axis, {_worst(same):.3g}",
             "of its contrast",
+            single_axis=_worst(published),
         ),
-        _disparity_finding("disparity error near seams", disparity),
+        _disparity_finding("disparity error near seams", disparity, published_disparity),
     ]
 
 
 def _all_around(heads: _Heads, scale: Scale) -> Finding:
     """Disparity from all sides, at no seam in particular."""
-    measured = []
+    measured, published = [], []
     for degrees in np.linspace(-170, 170, scale.pick(5, 18)):
         views = heads.views(around(), float(degrees))
         measured.append(heads.disparity_errors(views, heads.images(views)))
-    return _disparity_finding("disparity error around the volume", measured)
+        published.append(heads.published_disparity_errors(views))
+    return _disparity_finding("disparity error around the volume", measured, published)
 
 
 def _shares(heads: _Heads, scale: Scale) -> Finding:
