@@ -9,7 +9,8 @@ from tolerances import FLOAT32_PICTURE, MATRIX
 from persp_sw import Regions, TransferFunction, View, Volume
 from persp_sw.geometry.factorization import factorize, viewport_from_world
 from persp_sw.geometry.view import Wall
-from persp_sw.measure.atlas import single_axis
+from persp_sw.measure.atlas import obliquity, single_axis
+from persp_sw.measure.atlas.case import Scale
 from persp_sw.measure.exact import Slab
 
 OPACITY = 0.05
@@ -251,3 +252,18 @@ def test_what_is_behind_the_viewer_is_not_drawn():
     for centre, seen in ((volume.centre, True), (eye + (0, 0, 9), False)):
         picture = single_axis.render(volume, RAMP, View.look_at(eye, centre, (0, 1, 0), 60, (16, 16)))
         assert picture.any() == seen and np.isfinite(picture).all()
+
+
+# --- In the atlas ------------------------------------------------------------------------------------------
+
+
+def test_the_atlas_shows_what_it_lacks_at_a_slant():
+    """Along the axes a slice too many; along edges and corners rays that are √2 and √3 longer, too."""
+    found = [finding for finding in obliquity.run(Scale(quick=True), lambda *_: None) if finding.single_axis]
+    opacity = {f.metric: f.single_axis for f in found if "closed form" in f.metric}
+    along_axes, along_edges, along_corners, *frusta = opacity.values()
+    assert OPACITY / 2 < along_axes < along_edges < along_corners
+    assert len(frusta) == 2 and min(frusta) > OPACITY
+    assert all(f.ray_caster is None or f.strips[0].single_axis is not None for f in found)
+    slanted = [f for f in found if f.ray_caster is not None and "√" in f.metric]
+    assert len(slanted) == 4 and all(f.single_axis > f.ray_caster for f in slanted)
