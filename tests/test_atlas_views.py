@@ -101,6 +101,14 @@ def test_sharpness_is_the_share_of_contrast_kept():
     assert zoom.sharpness(0.5 + 0.4 * (truth - 0.5), truth) == pytest.approx(0.4)
 
 
+def test_an_enlarged_picture_is_linear_between_its_pixels():
+    ramp = np.arange(6.0)[:, None, None] + 10 * np.arange(6.0)[:, None] + np.zeros(4)
+    found = zoom.enlarged(ramp, 24)
+    places = np.clip((np.arange(24) + 0.5) / 4 - 0.5, 0, 5)
+    np.testing.assert_allclose(found[..., 0], places[:, None] + 10 * places)
+    np.testing.assert_array_equal(zoom.enlarged(ramp, 6), ramp)
+
+
 # --- Each case fails when what it guards is broken ----------------------------------------------------------
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,28 +91,54 @@ def sharpness(picture: NDArray[np.floating], truth: NDArray[np.floating]) -> flo
     return float(np.sqrt(steps(np.asarray(picture, np.float64)) / of_truth)) if of_truth > 0 else 1.0
 
 
+def with_rays(view: View, rays: int) -> View:
+    """The view with so many pixels, but no more than it has, in a square."""
+    edge = min(int(np.sqrt(rays)), *view.size)
+    return View(view.eye, replace(view.wall, pixels=(edge, edge)))
+
+
+def enlarged(picture: NDArray[np.floating], pixels: int) -> NDArray[np.float64]:
+    """A square picture with `pixels` a side, bilinear between its pixels' middles."""
+    places = np.clip((np.arange(pixels) + 0.5) * len(picture) / pixels - 0.5, 0, len(picture) - 1)
+    low = np.minimum(places.astype(int), max(len(picture) - 2, 0))
+    high, share = np.minimum(low + 1, len(picture) - 1), places - low
+    rows = picture[low] + share[:, None, None] * (picture[high] - picture[low])
+    return rows[:, low] + share[None, :, None] * (rows[:, high] - rows[:, low])
+
+
 def _sharpness(way: _Way, progress: Progress) -> list[Finding]:
     """All the way, of either look."""
     found = []
     for look, transfer in LOOKS.items():
         renderer = Renderer(way.volume, transfer)
-        sharp, strips, published = [], [], []
+        sharp, strips, published, rays = [], [], [], []
         for at, gap in enumerate(way.gaps):
             progress(at, len(way.gaps), f"zoom, {look}")
-            picture, truth = renderer.render(way.view(gap)), way.truth(look, gap)
+            view, truth = way.view(gap), way.truth(look, gap)
+            image = renderer.composite(view.eye, [view.wall])
+            picture = renderer.warp(image, view)
             sharp.append(sharpness(picture, truth))
+            rays.append(len(image.pixels))
             published.append(sharpness(single_axis.render(way.volume, transfer, way.view(gap)), truth))
             strips.append(Strip(f"{look}, {gap:.3g} voxels from the surface", picture, truth))
         softest = int(np.argmin(sharp))
+        view = way.view(way.gaps[softest])
+        ideal = reference.render(way.volume, transfer, with_rays(view, rays[softest]))
+        ideal = enlarged(ideal, way.pixels)
+        rival = sharpness(ideal, strips[softest].reference)
         found.append(
             Finding(
                 f"sharpness at its least, {look}",
                 sharp[softest],
-                1 / 1.5,
-                "1 / 1.5 of the converged reference, which a plain ray caster of every pixel matches",
+                rival / 1.5,
+                "1 / 1.5 of a ray caster, converged, with as many rays as the image has pixels, enlarged",
                 "of the reference",
                 at_least=True,
-                strips=[strips[0], strips[softest], strips[-1]],
+                strips=[
+                    *(strips[at] for at in (0, softest, -1)),
+                    Strip("ray caster, converged, as many rays, enlarged", ideal, strips[softest].reference),
+                ],
+                ray_caster=rival,
                 single_axis=float(np.nanmin(published)),
             )
         )
