@@ -177,14 +177,22 @@ def test_a_tangent_badly_chosen_is_seen(monkeypatch):
     assert failing(obliquity._sweep(QUICK, silent), "rms error at single_face_tangent")
 
 
-def test_a_pixel_a_voxel_of_the_nearest_slice_alone_fails_close_up(monkeypatch):
-    """As published: the intermediate image shrinks to nothing before the eye."""
-    monkeypatch.setattr(
-        persp_sw.geometry.faces,
-        "_volume_pitch",
-        lambda geometry, sight: 1 / max(sight.nearest, 0.0 if geometry.inside else sight.nearest, 1e-3),
-    )
-    assert failing(zoom.run(QUICK, silent), "sharpness at its least")
+def test_an_image_that_shrinks_before_the_eye_is_too_small(monkeypatch):
+    """As published, a pixel a voxel of the nearest slice alone: close up, few are left."""
+    true = persp_sw.geometry.faces._volume_pitch
+    monkeypatch.setattr(persp_sw.geometry.faces, "_volume_pitch", lambda *a: 4 * true(*a))
+    assert failing(zoom._costs(zoom._Way.of(QUICK)), "image at its smallest")
+
+
+def test_a_picture_out_of_focus_is_not_sharp(monkeypatch):
+    true = persp_sw.Renderer.warp
+
+    def warp(self, image, view, out=None):
+        picture = true(self, image, view, out)
+        return sum(np.roll(picture, (v, u), (0, 1)) for v in (-1, 0, 1) for u in (-1, 0, 1)) / 9
+
+    monkeypatch.setattr(persp_sw.Renderer, "warp", warp)
+    assert failing(zoom._sharpness(zoom._Way.of(QUICK), silent), "sharpness at its least")
 
 
 def test_a_fine_pitch_costs_too_much(monkeypatch):

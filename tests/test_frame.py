@@ -51,7 +51,7 @@ def test_four_walls_and_two_eyes_take_two_compositings():
     maker = maker_of(cave())
     calls = []
     composite = maker.renderer.composite
-    maker.renderer.composite = lambda *a: calls.append(a) or composite(*a)
+    maker.renderer.composite = lambda *a, **more: calls.append(a) or composite(*a, **more)
     frame = maker.make(Pose((0, 1.7, 0.6)), eyes_at(Pose((0, 1.7, 0.6))))
     assert len(calls) == frame.compositings == 2
     assert [(p.wall.name, p.eye) for p in frame.pictures] == [

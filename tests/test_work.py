@@ -115,5 +115,5 @@ def test_what_zones_and_faces_have_in_common_is_prepared_once(monkeypatch):
     renderer = Renderer(placed(synthetic_ct(64)), FOG, Settings(quality=0.25))
     image = renderer.composite(Eye((0.05, 1.5, -0.2)), four_walls(64))
     assert len(image.faces) == 6
-    assert {number for number, *_ in made} == {0, 1}  # whose zones blend the two levels
+    assert {number for number, *_ in made} >= {0, 1}  # zones blend each two levels
     assert len(made) == len(set(made))

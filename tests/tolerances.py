@@ -219,6 +219,9 @@ HOST_PICTURE_HALF = 1e-3
 # Bilinear weights of 8 bits along each axis, of neighbours that differ by less than 1/4 in a smooth volume:
 # 2 · 2⁻⁹ / 4; and corners in float32.
 QUADS = 2e-3
+# Quads end at a seam, where we mix what two faces show of a zone: half of what they differ by, each off by up
+# to 0.008 where a smooth volume of 16 voxels is sampled once a slice.
+QUADS_AT_SEAMS = 8e-3
 # An sRGB picture of bytes: rounded when the scene is written, half a step, of which (1 − α) is let through
 # and made up to twice as many by the curve, where light is low; and rounded again.
 CPP_BYTES = 1.5

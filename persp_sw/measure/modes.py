@@ -34,7 +34,7 @@ SAMPLING: dict[str, Changes] = {
 # What else a chart varies, one option after the other.
 OPTIONS: dict[str, dict[str, Changes]] = {
     "levels of detail": {"no levels of detail": {"level_of_detail": False}},
-    "faces": {"several faces": {"single_face_tangent": 1.0}, "one face": {"single_face_tangent": 8.0}},
+    "faces": {"one face": {"single_face_tangent": 8.0}},
     "termination": {"residual 0.0005": {"residual": 0.0005}, "residual 0.02": {"residual": 0.02}},
 }
 
@@ -48,7 +48,7 @@ ABLATIONS: dict[str, Changes] = {
     "pre-integrated": {"preintegrated": True},
     "samples at points": {"preintegrated": False},
     "no levels of detail": {"level_of_detail": False},
-    "a face for each axis": {"single_face_tangent": 1.0},
+    "one face for all rays": {"single_face_tangent": 8.0},
 }
 
 
