@@ -16,7 +16,12 @@ Points: TypeAlias = NDArray[np.float64]  # (..., 3) xyz
 Voxels: TypeAlias = NDArray[np.generic]  # [z, y, x]
 Vector: TypeAlias = Sequence[float] | NDArray[np.floating]  # 3 numbers, xyz
 
+# Largest world coordinate: products of four, as of a wall's area squared, stay within float64.
+FARTHEST = 1e60
+
 VOXEL_DTYPES = tuple(np.dtype(t) for t in (np.uint8, np.int16, np.uint16, np.float32))
+
+_LONGEST = 200  # characters of a value in an error
 
 
 def number(
@@ -24,19 +29,39 @@ def number(
 ) -> float:
     """`value` as a finite float in [low, high], or `error` naming it; no text, truth value or array."""
     good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-    if not (good and np.isfinite(value) and low <= value <= high):
+    try:
+        good = good and np.isfinite(float(value))
+    except OverflowError:  # a whole number beyond float64
+        good = False
+    if not (good and low <= value <= high):
         least = "" if np.isinf(low) else f" ≥ {low:g}"
         wanted = f"must be a number{least}" if np.isinf(high) else f"lies between {low:g} and {high:g}"
-        raise error(f"{name} {wanted}; given {value!r}")
+        raise error(f"{name} {wanted}; given {shown(value)}")
     return float(value)
 
 
-def vector(value: Vector, name: str, error: type[PerspSWError], length: int = 3) -> NDArray[np.float64]:
-    """`value` as a finite float64 array of `length` numbers, or `error` naming it."""
+def vector(
+    value: Vector, name: str, error: type[PerspSWError], length: int = 3, largest: float = FARTHEST
+) -> NDArray[np.float64]:
+    """`value` as a float64 array of `length` numbers of −largest … largest, or `error` naming it."""
     try:
-        array = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
-        raise error(f"{name} must be {length} numbers; given {value!r}") from None
+        array = np.asarray(value)
+        if array.dtype.kind not in "biufO":  # text, times, complex numbers
+            raise TypeError
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise error(f"{name} must be {length} numbers; given {shown(value)}") from None
     if array.shape != (length,) or not np.isfinite(array).all():
-        raise error(f"{name} must be {length} finite numbers; given {value!r}")
+        raise error(f"{name} must be {length} finite numbers; given {shown(value)}")
+    if (np.abs(array) > largest).any():
+        raise error(f"{name} has numbers beyond ±{largest:g}; given {shown(value)}")
     return array
+
+
+def shown(value: object) -> str:
+    """A value as an error tells it, on one line, however long."""
+    try:
+        text = " ".join(repr(value).split())
+    except ValueError:  # a whole number of more digits than Python writes
+        text = f"a {type(value).__name__} of very many digits"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} …"

@@ -32,8 +32,9 @@ class Settings:
     level_of_detail
         Take coarser voxels where pixels are more than some 2.4 voxels apart, which would alias and cost more.
     skip_empty
-        Leave out what the transfer function makes invisible. Changes no pixel of a face, but faces are as
-        large as the whole volume asks for without; off only for measuring.
+        Leave out what the transfer function makes invisible. Changes no pixel of a face where `residual` is
+        0, else none by more than that: 16 rays go on together, and further past their end the more there is
+        to see. Without, faces are as large as the whole volume asks for; off only for measuring.
     pack_runs
         Store visible voxels alone. Changes no pixel; off only for measuring.
     intermediate_size

@@ -237,3 +237,16 @@ TRACE_DECIMALS = 2 * 0.5e-3
 FLOAT32_PICTURE = 2e-6
 # Midpoints of 4 … 64 pieces of a ray: the next term of the error is 1/16 of the first at the coarsest.
 PLAIN_ORDER = 0.1
+
+# --- Properties --------------------------------------------------------------------------------------------
+
+# A ray's light is a sum of at most 4 · 24 samples and their weights, each rounded twice by 6e-8.
+POSSIBLE = 1.2e-5
+# Waves of 2π/0.7 voxels and longer (0.4 a voxel along each axis) in slices met at up to 3 voxels, phases h of
+# 2 and less: a trapezoid sum of their varying half errs by h²/12 = 0.33, half of it a mean. Beside it a row
+# may gain or lose half a pixel at each end, where the box is seen to begin and to end.
+OF_ALPHA = 0.17
+# A pitch that is kept is up to 1.1 times too coarse, and lies one step of packets away (1 / (n + ½), n = 14,
+# 30, 46 …) where steps meet: 30.5 / 14.5 = 2.1 at most, and no more than √2 of it to either side of what was
+# asked for, as often. An edge's error grows as √pitch, a smooth picture's as pitch².
+KEPT = 2.1

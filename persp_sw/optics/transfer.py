@@ -49,7 +49,7 @@ class TransferFunction:
     ):
         try:
             rows = np.array([[v, *rgb, a] for v, rgb, a in points], np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise TransferFunctionError("control points are (value, (r, g, b), opacity)") from None
         _check_points(rows)
         if opacity_unit is not None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..arrays import VOXEL_DTYPES, Matrix, Vector, Voxels, vector
+from ..arrays import FARTHEST, VOXEL_DTYPES, Matrix, Vector, Voxels, shown, vector
 from ..errors import VolumeError
 
 _WIDENED = {"bool": np.uint8, "int8": np.int16}  # everything else that is a real number becomes float32
@@ -103,7 +103,12 @@ class Volume:
 
 
 def _checked_voxels(data: Voxels) -> tuple[Voxels, int]:
-    data = np.asarray(data)
+    try:
+        data = np.asarray(data)
+    except ValueError:
+        raise VolumeError(
+            "a volume's voxels are an array [z, y, x]; given lists of unequal lengths"
+        ) from None
     if data.ndim != 3:
         raise VolumeError(f"a volume has three axes [z, y, x]; given an array of shape {data.shape}")
     if data.size == 0:
@@ -134,9 +139,15 @@ def _checked_pose(spacing: Vector | None, world_from_object: Matrix | None) -> M
         return np.diag([*spacing, 1.0])
     if spacing is not None:
         raise VolumeError("give spacing or world_from_object, not both: the pose contains the spacing")
-    pose = np.asarray(world_from_object, np.float64)
-    if pose.shape != (4, 4) or not np.isfinite(pose).all() or not np.array_equal(pose[3], (0, 0, 0, 1)):
-        raise VolumeError(f"world_from_object must be a finite affine (4, 4) matrix; given {pose.tolist()}")
+    try:
+        pose = np.stack([vector(row, "a row of it", VolumeError, 4) for row in world_from_object])
+        if pose.shape != (4, 4) or not np.array_equal(pose[3], (0, 0, 0, 1)):
+            raise VolumeError("its last row is not 0, 0, 0, 1")
+    except (TypeError, ValueError, VolumeError):
+        raise VolumeError(
+            f"world_from_object must be an affine (4, 4) matrix of finite numbers within ±{FARTHEST:g}; "
+            f"given {shown(world_from_object)}"
+        ) from None
     lengths = np.linalg.norm(pose[:3, :3], axis=0)
     if (lengths == 0).any() or abs(np.linalg.det(pose[:3, :3] / lengths)) < 1e-9:
         raise VolumeError(f"world_from_object is singular: its axes are {pose[:3, :3].T.tolist()}")
