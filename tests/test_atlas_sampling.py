@@ -13,6 +13,7 @@ import pytest
 from tolerances import CLOSED_FORM
 
 from persp_sw import Renderer, Settings, View
+from persp_sw.errors import GraphicsError
 from persp_sw.geometry.parts import shown_parts
 from persp_sw.kernels.composite import composite as composite_face
 from persp_sw.measure.atlas import (
@@ -23,6 +24,7 @@ from persp_sw.measure.atlas import (
     moving_plane,
     opacity_extremes,
     sharp_classification,
+    texture_run,
     thin_sheets,
 )
 from persp_sw.measure.atlas.case import Scale
@@ -33,7 +35,9 @@ from persp_sw.measure.memory import resident_bytes
 from persp_sw.optics import classification as tables
 from persp_sw.optics.classification import Classification
 from persp_sw.sampling import Sampling
+from persp_sw.warp.framebuffer import Framebuffer
 from persp_sw.warp.gl_objects import Texture
+from persp_sw.warp.texture import TextureWarp
 
 QUICK = Scale(quick=True)
 
@@ -255,10 +259,51 @@ def test_what_an_earlier_frame_leaves_behind_is_found_out(monkeypatch):
     assert "drawn again" in failing(walk())
 
 
+@pytest.fixture
+def laps(gl_context):
+    """What two laps in OpenGL find; skipped where there is none."""
+    return lambda: texture_run.texture_findings(15, 2, no_progress)
+
+
 @pytest.mark.gl
-def test_textures_that_are_never_deleted_are_found_out(monkeypatch):
-    monkeypatch.setattr(Texture, "delete", lambda _: None)
-    findings = long_runs.texture_findings(40)
-    if not findings:
-        pytest.skip("no OpenGL without a screen")
-    assert "objects more" in failing(findings)
+def test_laps_in_opengl_hold(laps):
+    assert failing(laps()) == ""
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize(
+    ("home", "method"), [(Texture, "delete"), (Framebuffer, "close")], ids=["textures", "framebuffers"]
+)
+def test_objects_that_are_never_deleted_are_found_out(laps, monkeypatch, home, method):
+    monkeypatch.setattr(home, method, lambda _: None)
+    failed = failing(laps())
+    assert "objects more" in failed and "objects left" in failed
+
+
+@pytest.mark.gl
+def test_programs_that_are_made_anew_are_found_out(laps, monkeypatch):
+    used = TextureWarp._use
+
+    def use(warp, sources, options):
+        warp._programs.clear()
+        return used(warp, sources, options)
+
+    monkeypatch.setattr(TextureWarp, "_use", use)
+    failed = failing(laps())
+    assert "objects more" in failed and "objects left" in failed
+
+
+@pytest.mark.gl
+def test_a_process_that_grows_in_opengl_is_found_out(laps, monkeypatch):
+    sizes = iter(range(10**8, 10**10, 10**7))
+    monkeypatch.setattr(texture_run, "resident_bytes", lambda: next(sizes))
+    assert "growth" in failing(laps())
+
+
+def test_without_opengl_laps_are_left_out_and_it_is_said(monkeypatch, caplog):
+    def absent():
+        raise GraphicsError("none here")
+
+    monkeypatch.setattr(texture_run, "OffscreenContext", absent)
+    assert texture_run.texture_findings(5, 2, no_progress) == []
+    assert "no long run of the texture warp: none here" in caplog.text

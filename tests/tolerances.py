@@ -242,6 +242,8 @@ PLAIN_ORDER = 0.1
 
 # A ray's light is a sum of at most 4 · 24 samples and their weights, each rounded twice by 6e-8.
 POSSIBLE = 1.2e-5
+# Below 2^-126 float32 holds ever fewer bits; such a length times 2^30, of an extinction as much smaller.
+FEW_BITS = 2.0**-95
 # Waves of 2π/0.7 voxels and longer (0.4 a voxel along each axis) in slices met at up to 3 voxels, phases h of
 # 2 and less: a trapezoid sum of their varying half errs by h²/12 = 0.33, half of it a mean. Beside it a row
 # may gain or lose half a pixel at each end, where the box is seen to begin and to end.
