@@ -248,7 +248,3 @@ FEW_BITS = 2.0**-95
 # 2 and less: a trapezoid sum of their varying half errs by h²/12 = 0.33, half of it a mean. Beside it a row
 # may gain or lose half a pixel at each end, where the box is seen to begin and to end.
 OF_ALPHA = 0.17
-# A pitch that is kept is up to 1.1 times too coarse, and lies one step of packets away (1 / (n + ½), n = 14,
-# 30, 46 …) where steps meet: 30.5 / 14.5 = 2.1 at most, and no more than √2 of it to either side of what was
-# asked for, as often. An edge's error grows as √pitch, a smooth picture's as pitch².
-KEPT = 2.1
