@@ -166,8 +166,8 @@ def assert_full(picture, truth):
     flips=st.tuples(*[st.booleans()] * 3),
 )
 def test_how_voxels_are_stored_changes_nothing(scene, order, flips):
-    """But which of two faces is taken that serve as well, and, as packets lie along another axis, how often
-    steep rays are sampled.
+    """But which of two faces is taken that serve as well, and, as packets lie along another axis, which pitch
+    fills them and how often steep rays are sampled.
     """
     assume(not scene.eye.is_at_infinity)  # whose pixels are counted from voxel 0
     tell(scene)
@@ -183,11 +183,12 @@ def test_how_voxels_are_stored_changes_nothing(scene, order, flips):
 
 
 def plain_directions(image):
-    """Which way the faces look, in the world; like no other where packets of steep rays sample more often."""
+    """Which way the faces look, in the world, and their pitch; like nothing where steep rays sample more."""
     axes = image.world_from_object[:3, :3] / np.linalg.norm(image.world_from_object[:3, :3], axis=0)
     if any(face.samples_per_interval(1) > 1 for face in image.faces):
         return object()
-    return sorted((np.round(face.sign * axes[:, face.axis], 6) + 0.0).tolist() for face in image.faces)
+    ways = [np.round(face.sign * axes[:, face.axis], 6) + 0.0 for face in image.faces]
+    return sorted([*way.tolist(), f"{face.pitch:.4g}"] for way, face in zip(ways, image.faces, strict=True))
 
 
 @given(scene=make.smooth_scenes(most=1, residual=0.0, intermediate_size=64), columns=st.integers(1, 24))
