@@ -240,8 +240,9 @@ PLAIN_ORDER = 0.1
 
 # --- Properties --------------------------------------------------------------------------------------------
 
-# A ray's light is a sum of at most 4 · 24 samples and their weights, each rounded twice by 6e-8.
-POSSIBLE = 1.2e-5
+# A ray's light is a sum of at most 4 · 24 samples and their weights, each rounded twice by 6e-8; and the mean
+# colour of a pre-integrated piece is a difference of sums over up to 1024 steps, as long as one of them.
+POSSIBLE = 1.2e-5 + 1024 * 6e-8
 # Below 2^-126 float32 holds ever fewer bits; such a length times 2^30, of an extinction as much smaller.
 FEW_BITS = 2.0**-95
 # Waves of 2π/0.7 voxels and longer (0.4 a voxel along each axis) in slices met at up to 3 voxels, phases h of
