@@ -111,9 +111,9 @@ class Renderer:
     ) -> EyeImage:
         """One eye image that serves all `walls`; the eye may be anywhere, inside the volume too.
 
-        `previous`, this eye's image of the frame before, makes the choice of faces and pitch stay where it is
-        while it serves about as well, so that an eye at rest between two choices does not flicker. Without it
-        nothing depends on earlier frames.
+        `previous`, the image of the frame before, is looked at for an eye at infinity only: the axis of its
+        rays stays while no other is better by a tenth, so that an eye at rest between two does not flicker.
+        Nothing else depends on earlier frames.
 
         `cancel`, asked in another thread, ends the work before the next row of pixels; the renderer, and
         `last`, then are as before the call, but that what was encoded is kept. Encoding itself is not
