@@ -416,11 +416,6 @@ _OTHERS = st.sampled_from(
 )
 
 
-def scalars() -> st.SearchStrategy:
-    """Numbers, and things that are none, but no lists or arrays of several."""
-    return st.one_of(_NUMBERS, _OTHERS.filter(lambda thing: np.ndim(thing) == 0))
-
-
 def junk() -> st.SearchStrategy:
     """Numbers good and bad, things that are none, and lists of them, of any length and depth."""
     one = st.one_of(_NUMBERS, _OTHERS)

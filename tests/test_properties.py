@@ -247,7 +247,7 @@ CALLS = {
         [(draw(make.junk()), draw(make.numbers(3)), draw(make.junk())) for _ in range(2)], 1.0
     ),
     "rows": lambda draw: TransferFunction.from_rows([draw(make.numbers(5)), draw(make.junk())]),
-    "eye": lambda draw: Eye(draw(make.junk()), draw(make.junk()), draw(make.scalars())),
+    "eye": lambda draw: Eye(draw(make.junk()), draw(make.junk()), draw(make.junk())),
     "eye at infinity": lambda draw: Eye.at_infinity(draw(make.junk())),
     "wall": lambda draw: Wall(*(draw(make.numbers(3)) for _ in "123"), draw(make.junk())),
     "corner": lambda draw: Wall((0, 0, 0), (1, 0, 0), draw(make.junk()), (4, 4)),
@@ -262,7 +262,7 @@ CALLS = {
     "regions": lambda draw: Regions(*(draw(make.junk()) for _ in "1234")),
     "crop": lambda draw: Regions(draw(make.numbers(6)), crop_flags=draw(make.junk())),
     "clip": lambda draw: Regions(clip=[draw(make.junk()) for _ in "12"]),
-    "cut": lambda draw: Cut(draw(make.junk()), draw(make.junk()), draw(make.scalars())),
+    "cut": lambda draw: Cut(draw(make.junk()), draw(make.junk()), draw(make.junk())),
     "cut of words": lambda draw: Regions(
         cut=[{"plane": draw(make.numbers(4)), "thickness": draw(make.junk())}]
     ),
@@ -292,6 +292,9 @@ def test_what_is_no_input_is_refused_in_words(call, data):
         lambda: Eye((0, 0, 10**400)),  # OverflowError
         lambda: Eye((0, 0, 0), 10**400),  # TypeError
         lambda: Eye((0, 0, 1j)),  # ComplexWarning
+        lambda: Eye((0, 0, 0), 0, np.zeros(3)),  # ValueError
+        lambda: Cut((0, 0, 1, 0), 1, np.zeros(3)),  # ValueError
+        lambda: Regions(clip=np.array(1.0)),  # TypeError
         lambda: Settings(quality=10**400),
         lambda: TransferFunction([(0, (0, 0, 10**400), 0.5)]),
         lambda: Volume([[[1, 2], [3]]]),  # ValueError

@@ -54,7 +54,7 @@ class Cut:
     def __post_init__(self):
         object.__setattr__(self, "plane", _plane(self.plane, "a cut's plane"))
         object.__setattr__(self, "thickness", number(self.thickness, "a cut's thickness", ViewError, 0))
-        if self.show not in ("inside", "outside"):
+        if not isinstance(self.show, str) or self.show not in ("inside", "outside"):
             raise ViewError(f'a cut shows "inside" or "outside"; given {self.show!r}')
 
 
@@ -95,7 +95,8 @@ class Regions:
             if (crop[0::2] > crop[1::2]).any():
                 raise ViewError(f"crop is [x0, x1, y0, y1, z0, z1] with x0 ≤ x1 …; given {crop.tolist()}")
             set_(self, "crop", tuple(crop.tolist()))
-        if not isinstance(self.clip, (Sequence, np.ndarray)) or isinstance(self.clip, str):
+        rows = self.clip.ndim > 0 if isinstance(self.clip, np.ndarray) else isinstance(self.clip, Sequence)
+        if not rows or isinstance(self.clip, str):
             raise ViewError(f"clip is a list of planes [nx, ny, nz, d]; given {self.clip!r}")
         set_(self, "clip", tuple(_plane(plane, "a clip plane") for plane in self.clip))
         if not isinstance(self.cut, Sequence) or isinstance(self.cut, str):

@@ -32,7 +32,7 @@ class Eye:
     def __post_init__(self):
         position = vector(self.position, "the eye's position", ViewError)
         near = number(self.near, "the near distance", ViewError, 0)
-        if self.w not in (0, 1):
+        if number(self.w, "an eye's w", ViewError) not in (0, 1):
             raise ViewError(f"an eye's w is 1, or 0 for an eye at infinity; given {self.w!r}")
         if self.w == 0:
             if near:
