@@ -70,6 +70,38 @@ def _limit(constant, slope, interval):
         interval[1] = -np.inf
 
 
+@kernel
+def _count(h, y, first, count, place, alone, counts):
+    """How much a face counts for pixels of a row, see `geometry.seams`."""
+    for n in range(np.uint64(count)):
+        x = np.float64(first + np.int64(n)) + 0.5
+        scale = place[2] / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
+        t_i = place[0] + (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale
+        t_j = place[1] + (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
+        counts[n] = _F(max(1.0 / max(abs(t_i), abs(t_j), 1.0) - alone, 0.0))
+
+
+@kernel
+def _clear_rest(pixels, shown, written):
+    """Clear what a row held before, but for the faces' columns; `written` is then all of these."""
+    column, begin, end = written[0], len(pixels), 0
+    for face in range(len(shown)):
+        if shown[face, 0] < shown[face, 1]:
+            begin, end = min(begin, shown[face, 0]), max(end, shown[face, 1])
+    while column < written[1]:
+        held, following = column, written[1]
+        for face in range(len(shown)):
+            if shown[face, 0] <= column < shown[face, 1]:
+                held = max(held, shown[face, 1])
+            elif column < shown[face, 0] < shown[face, 1]:
+                following = min(following, shown[face, 0])
+        if held == column:
+            pixels[column:following] = _F(0.0)
+            held = following
+        column = held
+    written[0], written[1] = begin, end
+
+
 @parallel_kernel
 def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, out):
     """Look every pixel's ray up in the faces that show it, bilinearly; nothing outside the faces.
@@ -97,24 +129,20 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
         float32 (height, width, 4), overwritten.
     """
     flat = out.reshape(-1)
+    faces = len(sizes)
     for row in prange(out.shape[0]):
         y = row + 0.5
-        interval = np.empty(2)
+        interval, shown = np.empty(2), np.zeros((faces, 2), np.int64)
         at, below = np.empty(_CHUNK, np.uint64), np.empty(_CHUNK, np.uint64)
         across, down = np.empty(_CHUNK, np.float32), np.empty(_CHUNK, np.float32)
         counts, found = np.empty(_CHUNK, np.float32), np.empty(4 * _CHUNK, np.float32)
-        total = np.zeros(out.shape[1] if len(sizes) > 1 else 0, np.float32)
+        total = np.zeros(out.shape[1] if faces > 1 else 0, np.float32)
         mixed_begin, mixed_end = out.shape[1], 0
-        old_begin, old_end = written[row, 0], written[row, 1]
-        written[row, 0], written[row, 1] = out.shape[1], 0
-        if len(sizes) > 1:
-            out[row, old_begin:old_end] = _F(0.0)
-        for face in range(len(sizes)):
+        for face in range(faces):
             h, width, height = face_from_view[face], sizes[face, 0], sizes[face, 1]
             u_0, v_0, w_0 = h[0, 1] * y + h[0, 2], h[1, 1] * y + h[1, 2], h[2, 1] * y + h[2, 2]
             u_x, v_x, w_x = h[0, 0], h[1, 0], h[2, 0]
             last_u, last_v = width - 1.0, height - 1.0
-            t_i, t_j, pitch = places[face, 0], places[face, 1], places[face, 2]
             interval[0], interval[1] = 0.0, np.float64(out.shape[1])
             for n in range(borders.shape[1]):
                 b = borders[face, n]
@@ -126,11 +154,7 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
             _limit(last_v * w_0 - v_0, last_v * w_x - v_x, interval)
             begin = np.int64(min(interval[0], np.float64(out.shape[1])))
             end = max(np.int64(max(interval[1], 0.0)), begin)
-            if len(sizes) == 1:
-                out[row, old_begin : max(min(begin, old_end), old_begin)] = _F(0.0)
-                out[row, min(max(end, old_begin), old_end) : old_end] = _F(0.0)
-            if begin < end:
-                written[row, 0], written[row, 1] = min(written[row, 0], begin), max(written[row, 1], end)
+            shown[face, 0], shown[face, 1] = begin, end
             for n in range(inner.shape[1]):
                 b = inner[face, n]
                 _limit(b[1] * y + b[2], b[0], interval)
@@ -140,8 +164,6 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
                 mixed = piece != 1
                 piece_begin = begin if piece == 0 else alone_begin if piece == 1 else alone_end
                 piece_end = alone_begin if piece == 0 else alone_end if piece == 1 else end
-                if mixed and piece_begin < piece_end:
-                    mixed_begin, mixed_end = min(mixed_begin, piece_begin), max(mixed_end, piece_end)
                 for first in range(piece_begin, piece_end, _CHUNK):
                     count = min(piece_end - first, _CHUNK)
                     for n in range(np.uint64(count)):
@@ -153,20 +175,24 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
                         across[n], down[n] = _F(u - left), _F(v - top)
                         start = np.uint64(sizes[face, 2] + np.int64(top) * width + np.int64(left))
                         at[n], below[n] = start, start + np.uint64(width)
-                        steepest = max(abs(t_i + u * pitch), abs(t_j + v * pitch), 1.0)
-                        counts[n] = _F(max(1.0 / steepest - alone, 0.0))
                     to = np.uint64(row * out.shape[1] + first)
-                    if mixed:
-                        for n in range(np.uint64(count)):
-                            _look_up(pixels, at[n], below[n], across[n], down[n], found, n)
-                        for n in range(np.uint64(count)):
-                            total[first + n] += counts[n]
-                            for channel in range(4):
-                                out[row, first + n, channel] += counts[n] * found[4 * n + channel]
-                    else:
+                    if not mixed:
                         for n in range(np.uint64(count)):
                             _look_up(pixels, at[n], below[n], across[n], down[n], flat, to + n)
+                        continue
+                    mixed_begin, mixed_end = min(mixed_begin, first), max(mixed_end, first + count)
+                    _count(face_from_view[face], y, first, count, places[face], alone, counts)
+                    for n in range(np.uint64(count)):
+                        _look_up(pixels, at[n], below[n], across[n], down[n], found, n)
+                    for n in range(np.uint64(count)):
+                        old = total[first + n]
+                        total[first + n] = old + counts[n]
+                        for channel in range(4):
+                            more = counts[n] * found[4 * n + channel]
+                            value = out[row, first + n, channel]
+                            out[row, first + n, channel] = more + (value if old > _F(0.0) else _F(0.0))
         for x in range(mixed_begin, mixed_end):
             if total[x] > _F(0.0):
                 for channel in range(4):
                     out[row, x, channel] /= total[x]
+        _clear_rest(out[row], shown, written[row])
