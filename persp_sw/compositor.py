@@ -31,6 +31,10 @@ from .volume.detail import DetailStore
 from .volume.levels import STANDARD_AXES
 
 
+# Voxels. Kernels count places in a row from a tile's first cell, up to some hundred, in float32.
+_SAME_VOXEL = 1e-5
+
+
 def composite_eye(
     detail: DetailStore,
     classification: Classification,
@@ -197,10 +201,16 @@ def _level(
         runs.voxels,
         factor,
         1 / factor,
-        box.ravel(),
+        _on_voxels(box).ravel(),
         seen.ravel(),
         runs.size[2],
     )
+
+
+def _on_voxels(box: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Borders of a box at voxels where they all but lie on them: float32 cannot tell on which side."""
+    nearest = np.rint(box)
+    return np.where(np.abs(box - nearest) < _SAME_VOXEL, nearest, box)
 
 
 def _overlap(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

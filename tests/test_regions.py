@@ -332,6 +332,23 @@ def test_thickness_is_in_world_units_whatever_the_normals_length():
     assert shown_parts(thick, slab.volume, EYE)[0].high[2] == pytest.approx(5)
 
 
+@pytest.mark.parametrize("tilt", [0, 1e-13, 1e-12, 1e-10, 1e-7, 1e-5])
+def test_a_plane_that_all_but_lies_on_a_slice_clips_like_one_that_does(tilt):
+    """Its box ends between a voxel and the next float64: float32 takes it for the voxel, and so must all."""
+    size = (11, 9, 10)
+    volume = Volume(np.ones(size[::-1], np.uint8))
+    medium = TransferFunction([(1, (0.9, 0.6, 0.3), 0.35)], 1.0)
+    regions = Regions(clip=[(tilt, 2 * tilt, 1, -4)])
+    for towards in ((-0.5, -0.5, -0.7), (0.4, -0.6, -0.6), (-0.7, 0.5, 0.4)):
+        view = view_of(volume, direction(*towards), distance=1.7, fovy=45, size=(96, 72))
+        image = composite(volume, medium, view, regions)
+        for number in range(len(image.faces)):
+            rays = face_view(image, number)
+            entry, leave = shown_part(volume, rays, regions)
+            exact = -np.expm1(-medium.extinction(1) * (leave - entry))
+            assert np.abs(image.face_pixels(number)[..., 3] - exact).max() < CLOSED_FORM
+
+
 # --- Borders between parts --------------------------------------------------------------------------------
 
 

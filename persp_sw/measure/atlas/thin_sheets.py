@@ -71,6 +71,8 @@ def sheet_findings(scale: Scale) -> list[Finding]:
                 view = view_towards(volume, _towards(normal, angle), size, 1.7, 25.0)
                 for picture, rays in faces_of(composite(volume, transfer, view)):
                     truth = reference.render(volume, transfer, rays)
+                    if not truth.any():  # a face beside the sheet
+                        continue
                     ours.append(_errors(picture, truth))
                     casts.append(_errors(plain.cast(volume, transfer, rays), truth))
                     label = f"{name} sheet {normal} at {angle}°"
