@@ -30,7 +30,6 @@ from .slabs import in_slabs, placed
 from .volume.detail import DetailStore
 from .volume.levels import STANDARD_AXES
 
-
 # Voxels. Kernels count places in a row from a tile's first cell, up to some hundred, in float32.
 _SAME_VOXEL = 1e-5
 

@@ -50,10 +50,10 @@ def _towards(normal: Vector, angle_deg: float) -> NDArray[np.float64]:
     return np.cos(np.radians(angle_deg)) * normal + np.sin(np.radians(angle_deg)) * aside
 
 
-def _errors(picture: NDArray[np.floating], truth: NDArray[np.floating]) -> _Errors:
-    return _Errors(
-        abs(float(picture[..., 3].sum() / truth[..., 3].sum()) - 1), rms(picture - truth) / rms(truth)
-    )
+def _errors(pictures: list[NDArray[np.floating]], truths: list[NDArray[np.floating]]) -> _Errors:
+    """Of all faces of a view together: one beside the sheet may show next to nothing of it."""
+    picture, truth = (np.concatenate([face.reshape(-1, 4) for face in faces]) for faces in (pictures, truths))
+    return _Errors(abs(float(picture[:, 3].sum() / truth[:, 3].sum()) - 1), rms(picture - truth) / rms(truth))
 
 
 def sheet_findings(scale: Scale) -> list[Finding]:
@@ -69,16 +69,17 @@ def sheet_findings(scale: Scale) -> list[Finding]:
             volume = sheet(n, normal)
             for angle in angles:
                 view = view_towards(volume, _towards(normal, angle), size, 1.7, 25.0)
-                for picture, rays in faces_of(composite(volume, transfer, view)):
-                    truth = reference.render(volume, transfer, rays)
-                    if not truth.any():  # a face beside the sheet
-                        continue
-                    ours.append(_errors(picture, truth))
-                    casts.append(_errors(plain.cast(volume, transfer, rays), truth))
-                    label = f"{name} sheet {normal} at {angle}°"
-                    strips.append(Strip(label, picture, truth.astype(np.float32)))
-                for picture, rays in single_axis.faces_of(volume, transfer, view):
-                    published.append(_errors(picture, reference.render(volume, transfer, rays)))
+                faces = list(faces_of(composite(volume, transfer, view)))
+                pictures = [picture for picture, _ in faces]
+                truths = [reference.render(volume, transfer, rays) for _, rays in faces]
+                ours.append(_errors(pictures, truths))
+                casts.append(_errors([plain.cast(volume, transfer, rays) for _, rays in faces], truths))
+                largest = max(range(len(faces)), key=lambda n: pictures[n].size)
+                truth = truths[largest].astype(np.float32)
+                strips.append(Strip(f"{name} sheet {normal} at {angle}°", pictures[largest], truth))
+                faces = single_axis.faces_of(volume, transfer, view)
+                pictures, views = zip(*faces, strict=True)
+                published.append(_errors(pictures, [reference.render(volume, transfer, v) for v in views]))
         worst = int(np.argmax([error.rms for error in ours]))
         own, cast, single = (
             _Errors(*(max(each) for each in zip(*of, strict=True))) for of in (ours, casts, published)
