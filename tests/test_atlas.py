@@ -20,7 +20,7 @@ from persp_sw.geometry.view import Eye
 from persp_sw.measure.atlas import catalogue, eye_positions, plain, shapes, values
 from persp_sw.measure.atlas.case import Case, Finding, Scale, Strip, in_parts
 from persp_sw.measure.atlas.outcome import outcome_of
-from persp_sw.measure.atlas.page import number_text, write_page, write_pictures
+from persp_sw.measure.atlas.page import number_text, with_unit, write_page, write_pictures
 from persp_sw.measure.atlas.strips import strip_rgb
 from persp_sw.measure.exact import Ramp, Slab
 from persp_sw.optics import classification, transfer
@@ -45,6 +45,9 @@ def by_metric(findings: list[Finding]) -> dict[str, Finding]:
 # --- Every case -------------------------------------------------------------------------------------------
 
 
+_STABILITY = (Path(__file__).parents[1] / "docs/stability.md").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize("case", catalogue.CASES, ids=lambda case: case.name)
 def test_every_finding_holds_at_small_sizes(case: Case):
     findings = case.run(QUICK, quiet)
@@ -52,6 +55,9 @@ def test_every_finding_holds_at_small_sizes(case: Case):
     by_metric(findings)
     assert any(finding.single_axis is not None for finding in findings) == (case.name != "long-runs")
     assert [(f.metric, f.value, f.bound, f.derived) for f in findings if not f.holds] == []
+    if case.name != "long-runs":  # which says how long
+        told = {finding.metric for finding in findings if with_unit(finding) in _STABILITY}
+        assert told == {finding.metric for finding in findings}
 
 
 def test_the_catalogue_can_be_named_and_read():

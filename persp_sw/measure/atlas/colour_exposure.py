@@ -94,6 +94,8 @@ def exposure_findings(scale: Scale) -> list[Finding]:
     ours, casts = [], []
     for picture, rays in faces_of(composite(volume, _LAYER, view)):
         truth = reference.render(volume, _LAYER, rays)
+        if not _surplus(picture, truth).size:
+            continue
         cast = plain.cast(volume, _LAYER, rays)
         ours.append(_surplus(picture, truth))
         casts.append(_surplus(cast, truth))
