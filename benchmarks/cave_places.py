@@ -25,6 +25,7 @@ PLACES = {
 }
 NAMES = ("engine.nrrd", "mni152_nilearn.nrrd", "heptane.nrrd")
 PIXELS, WARM, FRAMES = 512, 3, 25
+ROW = "{:20} {:9} {:>7} {:>9} {:>7} {:>7} {:>9} {}"
 
 
 def frame(renderer: psw.Renderer, eyes, walls, canvases):
@@ -44,9 +45,7 @@ def frame(renderer: psw.Renderer, eyes, walls, canvases):
 def main(folder: str, *names: str) -> None:
     walls = four_walls(PIXELS)
     canvases = [psw.Canvas(PIXELS, PIXELS) for _ in walls]
-    print(
-        f"{'volume':20} {'place':9} {'plan':>6} {'composite':>9} {'warp':>6} {'ms':>7} {'samples':>9} faces"
-    )
+    print(ROW.format("volume", "place", "plan", "composite", "warp", "ms", "samples", "faces"))
     for name in names or NAMES:
         renderer = psw.Renderer(placed(psw.load(Path(folder) / name)))
         for place, head in PLACES.items():
@@ -57,10 +56,8 @@ def main(folder: str, *names: str) -> None:
             plan, composite, warp = 1e3 * np.median([times for times, _ in measured], axis=0)
             images = measured[-1][1]
             samples, faces = sum(i.samples for i in images), [len(i.faces) for i in images]
-            total = plan + composite + warp
-            print(
-                f"{name:20} {place:9} {plan:6.2f} {composite:9.2f} {warp:6.2f} {total:7.2f} {samples:9d} {faces}"
-            )
+            numbers = (f"{ms:.2f}" for ms in (plan, composite, warp, plan + composite + warp))
+            print(ROW.format(name, place, *numbers, samples, str(faces)))
 
 
 if __name__ == "__main__":
