@@ -2,8 +2,8 @@
 
     python benchmarks/cave_places.py FOLDER [NAME …]
 
-FOLDER holds volumes (`engine.nrrd`, `mni152_nilearn.nrrd`, `heptane.nrrd`, or NAMEs). Medians of 25 frames; to
-compare two versions run both in turn.
+FOLDER holds volumes (`engine.nrrd`, `mni152_nilearn.nrrd`, `heptane.nrrd`, or NAMEs). Medians of 25 frames;
+to compare two versions run both in turn.
 """
 
 from __future__ import annotations
