@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.typing import DTypeLike, NDArray
 
 from ... import reference
 from ...arrays import Image
-from ...errors import TransferFunctionError, VolumeError
 from ...geometry.view import View
 from ...optics.transfer import TransferFunction
 from ...renderer import Renderer
@@ -19,11 +17,11 @@ from ...volume.grid import Volume
 from ..exact import shown_part
 from ..metrics import max_error
 from . import single_axis
+from .bad_input import taken_without_a_word
 from .case import Case, Finding, Progress, Scale, Strip
 from .face_views import (
     TIMES_MIDPOINTS,
     WHY_TIMES_MIDPOINTS,
-    JudgedFace,
     face_view,
     judged_faces,
     judged_single_axis,
@@ -31,10 +29,7 @@ from .face_views import (
     rms_ratio,
     single_axis_ratio,
 )
-
-# Plain samples on slices beside a voxel without a value stand for half an interval of a cell that has it for
-# a corner, on either side of it.
-BESIDE_A_GAP = 1.0
+from .missing_values import BESIDE_A_GAP, miscounted, shown_in_gaps, with_gaps
 
 _COLOUR = np.array([0.9, 0.6, 0.3])
 _FUNCTION_POINTS = 4096
@@ -84,7 +79,11 @@ def scenes(n: int) -> list[Scene]:
             Volume(_over_range(values)),
             TransferFunction(smooth_rows(-32768, 32767)),
         ),
-        Scene("float32 with NaN and infinities", with_gaps(n), TransferFunction(smooth_rows(-1, 1))),
+        Scene(
+            "float32 with NaN and infinities",
+            Volume(with_gaps(field(n))),
+            TransferFunction(smooth_rows(-1, 1)),
+        ),
         Scene("float32, tiny", Volume((1e-30 * values).astype(np.float32)), _function(1e-30)),
         Scene("float32, huge", Volume((1e38 * values).astype(np.float32)), _function(1e38)),
         Scene("4096 points", Volume(signed), many_points()),
@@ -104,22 +103,6 @@ def _bytes(values: NDArray[np.float64]) -> NDArray[np.uint8]:
 def _over_range(values: NDArray[np.float64]) -> NDArray[np.int16]:
     low, high = values.min(), values.max()
     return np.rint(-32768 + (values - low) / (high - low) * 65535).astype(np.int16)
-
-
-def gaps(n: int) -> NDArray[np.float32]:
-    """`field` with a ball without values at its front, and lone voxels elsewhere: NaN, ∞ and −∞."""
-    values = field(n).astype(np.float32)
-    z, y, x = np.indices(values.shape) / (n - 1.0) - 0.5
-    values[(x - 0.1) ** 2 + (y - 0.1) ** 2 + (z - 0.4) ** 2 < 0.25**2] = np.nan
-    lone = np.random.default_rng(9).random(values.shape) < 10 / n**3
-    values[lone] = np.inf
-    values[np.roll(lone, 3, 2)] = -np.inf
-    return values
-
-
-def with_gaps(n: int) -> Volume:
-    """The volume of `gaps`."""
-    return Volume(gaps(n))
 
 
 def many_points() -> TransferFunction:
@@ -217,31 +200,6 @@ def constant_excess(dtype: DTypeLike, value: float) -> tuple[float, float]:
     return max(ours, default=np.inf), max(published, default=np.nan)
 
 
-def miscounted(n: int) -> int:
-    """How far the number of voxels without a value that a volume tells is from the number put in."""
-    values = gaps(n)
-    return abs(Volume(values).nonfinite - int(np.count_nonzero(~np.isfinite(values))))
-
-
-def shown_in_gaps(
-    samples_per_interval: int | None = None,
-    judged: Callable[[Renderer, View], list[JudgedFace]] = judged_faces,
-) -> float:
-    """Most of a ray, in voxels, that shows although it is in a cell with a corner without a value."""
-    data = np.full((9, 9, 9), 1, np.float32)
-    data[4, 4, 4] = np.nan
-    volume = Volume(data)
-    transfer = TransferFunction([(1, tuple(_COLOUR), 0.1)], 1.0)
-    renderer = Renderer(
-        volume, transfer, Settings(residual=0, samples_per_interval=samples_per_interval, quality=4)
-    )
-    view = View.look_at((4.2, 4.3, -300), (4.2, 4.3, 4), (0, 1, 0), 1.5, (32, 32))
-    faces = judged(renderer, view)
-    with np.errstate(divide="ignore"):
-        more = [np.log1p(-face.truth[..., 3]) - np.log1p(-face.ours[..., 3]) for face in faces]
-    return float(np.max(more)) / float(transfer.extinction(1.0))
-
-
 def change_by_denormals(n: int, pixels: int) -> float:
     """Largest change of a picture when its zeros become denormal numbers, of both signs."""
     values = np.maximum(field(n), 0).astype(np.float32)
@@ -269,45 +227,6 @@ def change_by_size(n: int, pixels: int) -> float:
     return max(max_error(pictures[0], other) for other in pictures[1:])
 
 
-def bad_input() -> dict[str, Callable[[], object]]:
-    """What must be refused, with a message that says what is wrong."""
-    white = (1.0, 1.0, 1.0)
-    points = {
-        "unsorted points": [(0, white, 0), (9, white, 0.5), (5, white, 1)],
-        "three points at one value": [(3, white, 0), (3, white, 0.5), (3, white, 1)],
-        "an opacity above 1": [(0, white, 0), (1, white, 1.5)],
-        "an opacity below 0": [(0, white, -0.1), (1, white, 1)],
-        "a colour above 1": [(0, (0, 2, 0), 0), (1, white, 1)],
-        "a value that is NaN": [(np.nan, white, 0), (1, white, 1)],
-        "an opacity that is NaN": [(0, white, np.nan), (1, white, 1)],
-        "a colour that is NaN": [(0, (0, np.nan, 0), 0.2), (1, white, 1)],
-        "an infinite value": [(0, white, 0), (np.inf, white, 1)],
-        "no points": [],
-    }
-    refused: dict[str, Callable[[], object]] = {
-        name: lambda rows=rows: TransferFunction(rows) for name, rows in points.items()
-    }
-    refused["voxels without any value"] = lambda: Volume(np.full((2, 2, 2), np.nan, np.float32))
-    refused["complex voxels"] = lambda: Volume(np.zeros((2, 2, 2), complex))
-    refused["no voxels"] = lambda: Volume(np.zeros((0, 2, 2), np.float32))
-    return refused
-
-
-def taken_without_a_word() -> list[str]:
-    """Names of `bad_input` that were taken, or refused by something else than a message for the user."""
-    taken = []
-    for name, make in bad_input().items():
-        try:
-            make()
-        except (TransferFunctionError, VolumeError):
-            continue
-        except Exception as error:
-            taken.append(f"{name} ({type(error).__name__})")
-        else:
-            taken.append(name)
-    return taken
-
-
 def run(scale: Scale, progress: Progress) -> list[Finding]:
     """The case."""
     n, pixels = scale.pick(24, 64), scale.pick(48, 160)
@@ -324,7 +243,7 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
         Finding("numbers that are NaN or infinite", sum(s.lost for s in found), 0, "none is to be"),
         Finding(
             "voxels without a value that are not counted",
-            miscounted(n),
+            miscounted(with_gaps(field(n))),
             0,
             "counted by the volume; info, render, view and cave say how many",
         ),
