@@ -106,6 +106,6 @@ def test_a_way_sets_all_that_a_chart_varies():
             assert plain[key] == getattr(Settings(), key)
 
 
-@pytest.mark.parametrize("way", [Way("1 sample"), Way("1 sample", ("several faces", "residual 0.02"))])
+@pytest.mark.parametrize("way", [Way("1 sample"), Way("1 sample", ("no levels of detail", "residual 0.02"))])
 def test_names(way: Way):
-    assert way.name in ("1 sample", "1 sample, several faces, residual 0.02")
+    assert way.name in ("1 sample", "1 sample, no levels of detail, residual 0.02")

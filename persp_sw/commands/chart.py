@@ -34,7 +34,7 @@ Examples:
 What is measured:
   1. samples on a ray (1, 2, 4, pre-integrated) × quality: all, a curve each;
   2. for what is on or near the front by then, one after the other: levels of
-     detail, one face or several, when a ray stops (residual);
+     detail, when a ray stops (residual);
   3. texture formats' upload, drawing and error, where there is OpenGL.
 The broad grey line is the front: no other setting is both faster and more
 accurate. From each peer an arrow leads to our time at its accuracy.

@@ -26,7 +26,7 @@ MODES: dict[str, Changes] = {
 # Each a curve in the chart, along the qualities. All that a chart varies is set, not left as the user has it.
 _AS_USUAL: Changes = {
     "preintegrated": False,
-    **{name: getattr(Settings(), name) for name in ("residual", "single_face_tangent", "level_of_detail")},
+    **{name: getattr(Settings(), name) for name in ("residual", "level_of_detail")},
 }
 SAMPLING: dict[str, Changes] = {
     name: {**_AS_USUAL, **changes} for name, changes in MODES.items() if "residual" not in changes
@@ -34,7 +34,6 @@ SAMPLING: dict[str, Changes] = {
 # What else a chart varies, one option after the other.
 OPTIONS: dict[str, dict[str, Changes]] = {
     "levels of detail": {"no levels of detail": {"level_of_detail": False}},
-    "faces": {"one face": {"single_face_tangent": 8.0}},
     "termination": {"residual 0.0005": {"residual": 0.0005}, "residual 0.02": {"residual": 0.02}},
 }
 

@@ -24,7 +24,7 @@ _INK, _PALE = "#222222", "#888888"
 # Of what is varied; sampling modes as usual are dots on a line.
 _SEVERAL = "several of these"
 _VARIED = dict(
-    zip([name for option in OPTIONS.values() for name in option] + [_SEVERAL], "DPXv*", strict=True)
+    zip([name for option in OPTIONS.values() for name in option] + [_SEVERAL], "DPX*", strict=True)
 )
 _COLUMNS = 3
 _NAMED = (0.25, 0.5, 1, 2, 4)  # qualities
