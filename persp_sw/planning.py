@@ -84,15 +84,7 @@ def plan_eye(
     eye_object = object_from_world[:3] @ (*eye.position, eye.w)
     parts, low, high = _seen_parts(store, regions, eye_object, eye.w)
     views = [View(eye, wall) for wall in walls] if parts else []
-    geometry = EyeGeometry(
-        eye_object,
-        low,
-        high,
-        views,
-        object_from_world,
-        eye.near,
-        eye.is_at_infinity,
-    )
+    geometry = EyeGeometry(eye_object, low, high, views, object_from_world, eye.near, eye.is_at_infinity)
     limit = settings.single_face_tangent
     return EyePlan(
         eye,
