@@ -71,13 +71,14 @@ def _limit(constant, slope, interval):
 
 
 @kernel
-def _count(h, y, first, count, place, alone, counts):
+def _count(tangents, y, first, count, alone, counts):
     """How much a face counts for pixels of a row, see `geometry.seams`."""
+    t = tangents
     for n in range(np.uint64(count)):
         x = np.float64(first + np.int64(n)) + 0.5
-        scale = place[2] / (h[2, 0] * x + h[2, 1] * y + h[2, 2])
-        t_i = place[0] + (h[0, 0] * x + h[0, 1] * y + h[0, 2]) * scale
-        t_j = place[1] + (h[1, 0] * x + h[1, 1] * y + h[1, 2]) * scale
+        scale = 1.0 / (t[2, 0] * x + t[2, 1] * y + t[2, 2])
+        t_i = (t[0, 0] * x + t[0, 1] * y + t[0, 2]) * scale
+        t_j = (t[1, 0] * x + t[1, 1] * y + t[1, 2]) * scale
         counts[n] = _F(max(1.0 / max(abs(t_i), abs(t_j), 1.0) - alone, 0.0))
 
 
@@ -103,7 +104,7 @@ def _clear_rest(pixels, shown, written):
 
 
 @parallel_kernel
-def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, out):
+def warp(face_from_view, borders, inner, tangents_from_view, alone, sizes, pixels, written, out):
     """Look every pixel's ray up in the faces that show it, bilinearly; nothing outside the faces.
 
     Parameters
@@ -115,8 +116,8 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
         b.
     inner
         float64 (n, m, 3): likewise where it does so alone; else it is mixed with others (`geometry.seams`).
-    places
-        float64 (n, 3): tangents (t_i, t_j) of each face's first pixel centre, and its pitch.
+    tangents_from_view
+        float64 (n, 3, 3): likewise, to the tangents of each face; asked where faces are mixed.
     alone
         c of the seams: how much faces count where they are mixed.
     sizes
@@ -181,7 +182,7 @@ def warp(face_from_view, borders, inner, places, alone, sizes, pixels, written, 
                             _look_up(pixels, at[n], below[n], across[n], down[n], flat, to + n)
                         continue
                     mixed_begin, mixed_end = min(mixed_begin, first), max(mixed_end, first + count)
-                    _count(face_from_view[face], y, first, count, places[face], alone, counts)
+                    _count(tangents_from_view[face], y, first, count, alone, counts)
                     for n in range(np.uint64(count)):
                         _look_up(pixels, at[n], below[n], across[n], down[n], found, n)
                     for n in range(np.uint64(count)):

@@ -92,18 +92,13 @@ def _draw(image: EyeImage, view: View, shift: NDArray[np.float64], canvas: Canva
         np.array([_pixel_from_tangents(face) @ matrix for face, matrix in zip(faces, rays, strict=True)]),
         shown,
         inner,
-        np.array([_first_place(face) for face in faces]),
+        np.array(rays),
         image.alone,
         np.array([(*face.size, image.offset(number)) for number, face in enumerate(faces)]),
         image.pixels,
         canvas.written,
         canvas.pixels,
     )
-
-
-def _first_place(face: Face) -> tuple[float, float, float]:
-    """Tangents of the first pixel's centre, and the pitch."""
-    return face.origin[0] + face.pitch / 2, face.origin[1] + face.pitch / 2, face.pitch
 
 
 def _pixel_from_tangents(face: Face) -> Matrix:
