@@ -6,7 +6,7 @@ ray is a matter of compositing. Here the rays of a face's own pixels are followe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,20 +49,21 @@ def face_view(image: EyeImage, number: int) -> View:
 def judged_faces(renderer: Renderer, view: View) -> list[JudgedFace]:
     """All faces that a view needs, judged; regions must be convex."""
     image = renderer.composite(view.eye, [view.wall])
-    scene = renderer.volume, renderer.transfer
-    found = []
-    for number in range(len(image.faces)):
-        rays = face_view(image, number)
-        truth = reference.render(*scene, rays, regions=renderer.regions, tolerance=1e-6).astype(np.float32)
-        found.append(JudgedFace(image.face_pixels(number), truth, cast(*scene, rays, renderer.regions)))
-    return found
+    numbers = range(len(image.faces))
+    return _judged(renderer, ((image.face_pixels(number), face_view(image, number)) for number in numbers))
 
 
 def judged_single_axis(renderer: Renderer, view: View) -> list[JudgedFace]:
     """As `judged_faces`: the shear-warp's of 2001 as `ours`, none where it has no picture of a view."""
+    faces = single_axis.faces_of(renderer.volume, renderer.transfer, view, renderer.regions)
+    return _judged(renderer, faces)
+
+
+def _judged(renderer: Renderer, faces: Iterable[tuple[Image, View]]) -> list[JudgedFace]:
+    """Pixels and the view that they are of, beside the reference and a plain ray caster."""
     scene = renderer.volume, renderer.transfer
     found = []
-    for pixels, rays in single_axis.faces_of(*scene, view, renderer.regions):
+    for pixels, rays in faces:
         truth = reference.render(*scene, rays, regions=renderer.regions, tolerance=1e-6).astype(np.float32)
         found.append(JudgedFace(pixels, truth, cast(*scene, rays, renderer.regions)))
     return found
