@@ -7,7 +7,7 @@ from views import DIRECTIONS, random_pose, view_of
 
 from persp_sw import View, Volume, Wall
 from persp_sw.geometry.faces import EyeGeometry, faces_for, needs_of
-from persp_sw.geometry.seams import REACH
+from persp_sw.geometry.seams import REACH, shares
 from persp_sw.geometry.sight import Sights, tangents
 
 
@@ -164,6 +164,20 @@ def test_a_grazing_wall_does_not_drive_the_pitch():
     grazing = Wall((-1000, -30, 35), (1000, -30, -100), (-1000, 60, 35), (64, 64))
     (face,) = plan(geometry_of(volume, View.through_wall(eye, grazing)))
     assert max(face.size) <= 64
+
+
+def test_shares_are_halves_on_a_seam_and_one_faces_beyond_its_zone(rng):
+    pitch = 0.01
+    found = shares(np.array([(1, 0.2, 1), (3, 1, 3 * 0.97), (1, -1, -1), (-0.1, -2, 0.3)]), pitch)
+    np.testing.assert_allclose(found[0], [0, 0.5, 0, 0, 0, 0.5])
+    np.testing.assert_array_equal(found[1], [0, 1, 0, 0, 0, 0])
+    np.testing.assert_allclose(found[2], [0, 1 / 3, 1 / 3, 0, 1 / 3, 0])
+    np.testing.assert_array_equal(found[3], [0, 0, 1, 0, 0, 0])
+    directions = rng.normal(size=(1000, 3))
+    found = shares(directions, pitch)
+    np.testing.assert_allclose(found.sum(1), 1)
+    largest = np.abs(directions).argmax(1)
+    assert (found.argmax(1) == 2 * largest + (directions[np.arange(1000), largest] > 0)).all()
 
 
 # --- The kernels' plain twins -----------------------------------------------------------------------------

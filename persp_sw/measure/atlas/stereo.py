@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Image
 from ...eye_image import EyeImage
-from ...geometry.seams import reach_of
+from ...geometry.seams import shares
 from ...geometry.view import View
 from ...renderer import Renderer
 from ...settings import Settings
@@ -167,11 +167,11 @@ def _shares(heads: _Heads, scale: Scale) -> Finding:
     places = np.random.default_rng(3).uniform(0, 1, (1000, 3)) * (np.array(volume.size) - 1.0)
     differ = []
     for degrees in np.arange(-180.0, 180.0, scale.pick(10.0, 2.0)):
-        shares = []
+        seen = []
         for view in heads.views(arc, float(degrees)):
             (pitch,) = {face.pitch for face in heads.images([view])[0].faces}
-            shares.append(_counts(places - view.eye.position, pitch))
-        differ.append(np.abs(shares[0] - shares[1]).max(-1))
+            seen.append(shares(places - view.eye.position, pitch))
+        differ.append(np.abs(seen[0] - seen[1]).max(-1))
     return Finding(
         "part by which the eyes see things along different axes, heads around the volume",
         float(np.mean(differ)),
@@ -179,13 +179,6 @@ def _shares(heads: _Heads, scale: Scale) -> Finding:
         "of each of two seams a stripe as wide as the eyes are apart, of a volume 1 m wide",
         "of a thing",
     )
-
-
-def _counts(towards: Array, pitch: float) -> Array:
-    """(n, 6): the shares of faces in what is seen along object-space directions; see `geometry.seams`."""
-    parts = np.concatenate([-towards, towards], 1)
-    counts = np.maximum(parts / parts.max(1, keepdims=True) - 1 / reach_of(pitch), 0)
-    return counts / counts.sum(1, keepdims=True)
 
 
 def run(scale: Scale, progress: Progress) -> list[Finding]:
