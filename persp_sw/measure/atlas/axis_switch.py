@@ -134,7 +134,8 @@ def _pops(stage: _Stage, scale: Scale, progress: Progress) -> list[Finding]:
         worst, strips, derived, rival, published = -1.0, [], _GOAL, None, None
         for path in paths:
             frames = stage.frames(path.arc, path.degrees(_SPEEDS[speed], scale.pick(5, 9)), path.distance)
-            value, change = popping(frames.errors), changes(frames.errors)
+            errors = frames.errors
+            value, change = popping(errors), changes(errors)
             if not value <= worst:
                 label = f"{name}, {stage.look}, {path.at:.1f}°"
                 worst, strips = value, strips_of_pop(label, frames.ours, frames.truths)

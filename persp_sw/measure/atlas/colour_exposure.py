@@ -77,10 +77,11 @@ def exposure_findings(scale: Scale) -> list[Finding]:
                 if face.axis == 0:
                     across.append(_surplus(picture, truth).max(initial=0.0))
                     continue
-                if not _surplus(picture, truth).size:  # a face that shows the surface's rim alone
+                surplus = _surplus(picture, truth)
+                if not surplus.size:  # a face that shows the surface's rim alone
                     continue
                 cast = plain.cast(volume, _LAYER, rays)
-                along.append(_surplus(picture, truth).mean())
+                along.append(surplus.mean())
                 along_casts.append(_surplus(cast, truth).mean())
                 label = f"a layer along the slices, edge {width} wide, from {towards}"
                 strips.append(Strip(label, picture, truth.astype(np.float32), gain=1.0))
@@ -94,10 +95,11 @@ def exposure_findings(scale: Scale) -> list[Finding]:
     ours, casts = [], []
     for picture, rays in faces_of(composite(volume, _LAYER, view)):
         truth = reference.render(volume, _LAYER, rays)
-        if not _surplus(picture, truth).size:
+        surplus = _surplus(picture, truth)
+        if not surplus.size:
             continue
         cast = plain.cast(volume, _LAYER, rays)
-        ours.append(_surplus(picture, truth))
+        ours.append(surplus)
         casts.append(_surplus(cast, truth))
         strips += [
             Strip(f"a hidden colour: {name}", shown, truth.astype(np.float32), gain=1.0)

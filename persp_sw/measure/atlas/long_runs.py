@@ -65,7 +65,7 @@ def run(scale: Scale, progress: Progress) -> list[Finding]:
 CASE = Case(
     "long-runs",
     "Long runs",
-    "What is kept from frame to frame (encodings, textures, choices of faces) may grow, drift or fail after "
+    "What is kept from frame to frame (encodings, textures, pictures' memory) may grow, drift or fail after "
     "thousands of frames. An eye walks at random about a volume and through it, while transfer functions, "
     "clip planes and crops change; afterwards the first picture must come out again, bit for bit.",
     run,

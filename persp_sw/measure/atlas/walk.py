@@ -92,7 +92,7 @@ def random_views(rng: np.random.Generator, renderer: Renderer) -> Iterator[View]
 def frames(renderer: Renderer, count: int, seed: int, walk: Walk) -> Iterator[tuple[View, EyeImage]]:
     """`count` frames' views and eye images; what went wrong is noted in `walk`."""
     rng = np.random.default_rng(seed)
-    views, previous = random_views(rng, renderer), None
+    views = random_views(rng, renderer)
     for number in range(count):
         if rng.random() < 0.02:
             renderer.transfer = random_transfer(rng)
@@ -102,13 +102,13 @@ def frames(renderer: Renderer, count: int, seed: int, walk: Walk) -> Iterator[tu
             walk.edits += 1
         view = next(views)
         try:
-            previous = renderer.composite(view.eye, [view.wall], previous)
+            image = renderer.composite(view.eye, [view.wall])
         except Exception:  # whatever it is: the run goes on, and tells how often
             if not walk.failures:
                 _log.exception("frame %d of a long run failed", number)
             walk.failures += 1
             continue
-        yield view, previous
+        yield view, image
 
 
 def wrong_numbers(picture: Image) -> int:
