@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from .geometry.view import Eye, View, Wall
     from .measure.trace import FrameRecord, TraceWriter
     from .measure.trace_reading import read_trace
+    from .optics.lighting import Light, Lighting
+    from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
     from .planning import EyePlan
     from .quality.controller import Choice, FrameTimeController
@@ -49,6 +51,10 @@ __all__ = [
     "FrameTimeController",
     "Framebuffer",
     "Ladder",
+    "Light",
+    "Lighting",
+    "Look",
+    "Modulation",
     "OffscreenContext",
     "PerspSWError",
     "Refinement",
@@ -86,6 +92,10 @@ _HOME = {
     "FrameTimeController": ".quality.controller",
     "Framebuffer": ".warp.framebuffer",
     "Ladder": ".quality.ladder",
+    "Light": ".optics.lighting",
+    "Lighting": ".optics.lighting",
+    "Look": ".optics.look",
+    "Modulation": ".optics.look",
     "OffscreenContext": ".warp.context",
     "PerspSWError": ".errors",
     "Refinement": ".quality.rest",

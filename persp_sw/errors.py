@@ -21,6 +21,10 @@ class TransferFunctionError(PerspSWError):
     """Control points that do not make a transfer function."""
 
 
+class LookError(PerspSWError):
+    """Lights, or anything else of a look, that cannot be."""
+
+
 class ViewError(PerspSWError):
     """An eye, wall or view that cannot be rendered."""
 
