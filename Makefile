@@ -25,7 +25,7 @@ $(READY): pyproject.toml constraints.txt
 	@echo "setting up .venv (again only when pyproject.toml or constraints.txt change)"
 	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear .venv || \
 	  { echo "error: cannot make a virtual environment; on Debian: apt-get install python3-venv"; exit 1; }
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[view,demo,vtk,bench,test]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[view,panel,movie,demo,vtk,bench,test]'
 	@touch $@
 
 demo: $(READY)
