@@ -436,7 +436,7 @@ def test_error_stays_below_the_tolerance(eye):
 
 
 def test_pixels_that_did_not_converge_are_told(monkeypatch):
-    def cast(_volume, _transfer, _view, _regions, _tolerance, states, _progress):
+    def cast(_volume, _transfer, _look, _view, _regions, _tolerance, states, _progress):
         states[0, :2, -1] = 1e-3, 1e-6
 
     monkeypatch.setattr(reference, "_cast_in_bands", cast)

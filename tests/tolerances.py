@@ -25,6 +25,21 @@ MIDPOINT_KINKS = 1e-7
 # lattice of 5 pixels a voxel integrates the tent's kinks to 0.01.
 MARKER_PIXELS = 0.05
 
+# Differences of values below 1e3 by 0.5 voxel and more, times a pose's inverse of up to 3: 1e-16 · 1e3 · 6,
+# and a few operations of that size.
+GRADIENT = 1e-11
+# sin(k·r) / (k·r) with k·r up to 0.12 · 4: the next term is (k·r)² / 20 = 0.012 of the first.
+GRADIENT_ORDER = 0.02
+
+# Two pictures within 1e-9, each the sum over pieces of what is asked for.
+LIT_AT_1E_9 = 2e-9
+# A surface's light comes from the first 1e-5 world units of the ray: 13.8 of extinction to 1e-4. Normals turn
+# by 1e-5 / 8, highlights of power 30 by 30 times as much, a light's cosines by no more; brightness below 4.
+LIT_SURFACE = 2e-4
+# As MIDPOINT_STEPS, with 1e5 samples: 10 steps of extinction 0.7, brightness up to 2, on 14 units, and
+# as many of colour where normals turn over; half of a sample each, of either sign.
+MIDPOINT_LIT = 1e-3
+
 # --- Metrics -----------------------------------------------------------------------------------------------
 
 # Sums of a few thousand float64 numbers of order 1.

@@ -21,7 +21,7 @@ from ..optics.transfer import TransferFunction
 from ..volume.grid import Volume
 
 TOLERANCE = 1e-4  # of the reference; the pictures are within 1e-6 of the truth or so, see `reference.render`
-_REFERENCE_SOURCE = Path(reference.__file__)
+_REFERENCE_SOURCES = sorted(Path(reference.__file__).parent.glob("*.py"))
 
 
 def default_cache() -> Path:
@@ -93,7 +93,7 @@ class Truths:
 def key_of(volume: Volume, transfer: TransferFunction, view: View, regions: Regions) -> str:
     """A name for all that a reference picture depends on, the reference's own source included."""
     transfer = transfer.with_unit(min(volume.spacing))
-    digest = hashlib.sha256(_REFERENCE_SOURCE.read_bytes())
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in _REFERENCE_SOURCES))
     parts: list[Any] = [
         *("volume", volume.data.shape, volume.data.dtype.str, volume.world_from_object.tolist()),
         *("transfer", transfer.points, transfer.opacity_unit),

@@ -56,11 +56,12 @@ class Lighting:
 
         C · (emissive + ambient + diffuse · Σ I · max(N·L, 0)) + specular · Σ I · max(R·L, 0)^power
 
-    N is the normal, against the gradient: from large values to small ones; R = 2·(N·V)·N − V is V mirrored.
-    With the model "blinn" R·L gives way to N·H, H half-way between L and V. Sums run over `lights` and the
-    headlight, a light at the eye: L = V on each ray. Where values do not change there is no normal, and only
-    what is emitted and ambient is left: N = −g / √(|g|² + ε²), g the gradient, ε a 10,000th of the longest
-    one possible (`volume.gradient`). Results may exceed 1.
+    N is the normal, against the gradient: from large values to small ones; R = 2·(N·V)·N − (N·N)·V is V
+    mirrored. With the model "blinn" R·L gives way to N·H, H = (L + V) / |L + V|. Sums run over `lights` and
+    the headlight, a light at the eye: L = V on each ray. Where values do not change there is no normal, and
+    only what is emitted and ambient is left: N = −g / √(|g|² + ε²), g the gradient, ε a 10,000th of the
+    longest one possible (`volume.gradient`). N·N, not 1: else a light behind would shine through such places
+    as a highlight. Results may exceed 1.
 
     Parameters
     ----------
@@ -76,6 +77,9 @@ class Lighting:
         The normal is turned towards the eye, so that surfaces are lit alike from within and from outside.
     model
         "phong" or "blinn".
+    shadow_offset
+        Smallest spacings, 0 … 100, towards a light from where shadows begin to count: with 0 a surface lies
+        in the shadow of its own outermost layer, and is darker than a lit one.
 
     Raises
     ------
@@ -94,6 +98,7 @@ class Lighting:
     lights: tuple[Light, ...] = ()
     two_sided: bool = True
     model: Model = "phong"
+    shadow_offset: float = 2.0
 
     def __post_init__(self):
         for name in ("ambient", "diffuse", "specular", "emissive"):
@@ -104,6 +109,8 @@ class Lighting:
             raise LookError(f"lights are a sequence of Light; given {self.lights!r}")
         object.__setattr__(self, "lights", tuple(self.lights))
         _truth(self.two_sided, "two_sided")
+        offset = number(self.shadow_offset, "shadow_offset", LookError, 0, 100)
+        object.__setattr__(self, "shadow_offset", offset)
         if self.model not in get_args(Model):
             raise LookError(f"model is one of {', '.join(get_args(Model))}; given {self.model!r}")
 

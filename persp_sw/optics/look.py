@@ -14,8 +14,8 @@ class Modulation:
     """Makes more of boundaries than of what they enclose, by the gradient's magnitude.
 
     A magnitude m, as a part of the largest possible one (`volume.gradient.largest_magnitude`), has the weight
-    w = clip((m − low) / (high − low), 0, 1). Extinction is multiplied by 1 − opacity + opacity·w, colour by
-    1 − colour + colour·w.
+    w = clip((m − low) / (high − low), 0, 1). Extinction is multiplied by 1 − opacity + opacity·w, colour,
+    before it is lit, by 1 − colour + colour·w. Of a volume of one value, m is 0.
 
     Parameters
     ----------
