@@ -24,7 +24,7 @@ _PACKAGE = Path(__file__).parent
 
 def _sources_hash() -> str:
     digest = hashlib.sha256()
-    for path in sorted([*_PACKAGE.glob("kernels/*.py"), *_PACKAGE.glob("reference.py"), Path(__file__)]):
+    for path in sorted([*_PACKAGE.glob("kernels/*.py"), *_PACKAGE.glob("reference/*.py"), Path(__file__)]):
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -76,6 +76,7 @@ __all__ = [
     "bits_of",
     "byte_now",
     "compile_seconds",
+    "exponent_and_mantissa",
     "inlined_kernel",
     "intrinsic",
     "kernel",
@@ -186,6 +187,23 @@ def power_of_two(_context, shifted):
         return builder.bitcast(builder.add(exponent, bias), ir.FloatType())
 
     return types.float32(types.float32), build
+
+
+@intrinsic
+def exponent_and_mantissa(_context, x):
+    """(n, m) as float32, x = m·2^n, 1 ≤ m < 2, of a normal float32 > 0; two numbers of any other."""
+
+    def build(context, builder, signature, arguments):
+        word = ir.IntType(32)
+        bits = builder.bitcast(arguments[0], word)
+        exponent = builder.and_(builder.lshr(bits, ir.Constant(word, 23)), ir.Constant(word, 0xFF))
+        exponent = builder.sitofp(builder.sub(exponent, ir.Constant(word, 127)), ir.FloatType())
+        one = ir.Constant(word, 0x3F800000)
+        mantissa = builder.or_(builder.and_(bits, ir.Constant(word, 0x7FFFFF)), one)
+        mantissa = builder.bitcast(mantissa, ir.FloatType())
+        return context.make_tuple(builder, signature.return_type, (exponent, mantissa))
+
+    return types.UniTuple(types.float32, 2)(types.float32), build
 
 
 @intrinsic

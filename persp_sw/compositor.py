@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +21,16 @@ from .geometry.regions import Regions
 from .geometry.view import Eye
 from .kernels.composite import Rays
 from .kernels.composite import composite as composite_face
-from .kernels.packet import IntegralTable, Table
 from .kernels.scanline import Level
-from .optics.classification import Classification
+from .kernels.tables import IntegralTable, LitIntegralTable, LitTable, Table
+from .optics.appearance import Appearance
+from .optics.shading import shade_of
 from .planning import EyePlan
 from .sampling import Sampling, choose_sampling
 from .settings import Settings
 from .slabs import in_slabs, placed
 from .volume.detail import DetailStore
+from .volume.grid import Volume
 from .volume.levels import STANDARD_AXES
 
 # Voxels. Kernels count places in a row from a tile's first cell, up to some hundred, in float32.
@@ -36,7 +39,7 @@ _SAME_VOXEL = 1e-5
 
 def composite_eye(
     detail: DetailStore,
-    classification: Classification,
+    appearance: Appearance,
     regions: Regions,
     settings: Settings,
     plan: EyePlan,
@@ -62,14 +65,17 @@ def composite_eye(
     box, half_spaces = np.array([geometry.low, geometry.high]), regions.planes(volume)
     image = EyeImage(eye, pose, tuple(faces), pixels, 0, box, half_spaces)
     images = [image.face_pixels(number) for number in range(len(faces))]
-    sampling = choose_sampling(settings, classification, volume)
-    level = cache(partial(_level, detail))  # zones, opposite faces and steps of depth have them in common
+    sampling = choose_sampling(settings, appearance.classification, volume)
+    reach = ceil(appearance.look.gradient_distance) if appearance.asks_gradients else 0
+    level = cache(
+        partial(_level, detail, reach)
+    )  # zones, opposite faces and steps of depth have them in common
 
     def between(faces: Sequence[Face], images: Sequence[Image], nearest: float, farthest: float) -> int:
         limits = nearest, farthest
         return sum(
             _composite(
-                detail, level, classification, part, settings, sampling, eye, geometry.eye, face,
+                detail, level, appearance, part, settings, sampling, eye, geometry.eye, face,
                 plan.own_rays, threads, limits, cancel, out,
             )
             for face, out in zip(faces, images, strict=True)
@@ -87,7 +93,7 @@ def composite_eye(
 def _composite(
     detail: DetailStore,
     level: Callable[[int, int, Part, bool], Level],
-    classification: Classification,
+    appearance: Appearance,
     part: Part,
     settings: Settings,
     sampling: Sampling,
@@ -131,7 +137,7 @@ def _composite(
         ]
     )
     half_spaces = part.half_spaces[:, [*axes, 3]]
-    table = _table(classification, preintegrated)
+    table = _table(appearance, preintegrated, volume, axes)
     pairs = per_interval > 1 or preintegrated
     samples = np.zeros(out.shape[0], np.int64)
     taken = 0
@@ -168,26 +174,36 @@ def _composite(
     return taken
 
 
-def _table(classification: Classification, preintegrated: bool) -> Table | IntegralTable:
-    """What kernels need of a transfer function."""
+def _table(
+    appearance: Appearance, preintegrated: bool, volume: Volume, axes: list[int]
+) -> Table | IntegralTable | LitTable | LitIntegralTable:
+    """What kernels need of a transfer function and its look, in the standard space of these axes."""
+    classification, look, shadows = appearance
     mapping = np.float32(classification.origin), np.float32(classification.scale)
+    table: Table | IntegralTable = Table(classification.rows, *mapping)
     if preintegrated:
         integrals = classification.integrals
         numbers = (np.float32(n) for n in (integrals.end, integrals.unit, integrals.steps))
-        return IntegralTable(integrals.sums, integrals.beyond, *mapping, *numbers)
-    return Table(classification.table, *mapping)
+        table = IntegralTable(integrals.sums, integrals.beyond, *mapping, *numbers)
+    if not appearance.asks_gradients:
+        return table
+    shade = shade_of(look, volume, axes, classification, shadows)
+    if preintegrated:
+        return LitIntegralTable(*table, *shade)
+    return LitTable(*table, (classification.table[:, 3] > 0).astype(np.uint8), *shade)
 
 
 def _level(
     detail: DetailStore,
+    reach: int,
     number: int,
     axis: int,
     part: Part,
     pairs: bool,
 ) -> Level:
-    """What the kernel needs of a part in level `number`."""
+    """What the kernel needs of a part in level `number`; `reach`: voxels around what is visible."""
     store, axes = detail.store(number), list(STANDARD_AXES[axis])
-    runs = store.axis(axis, pairs=pairs)
+    runs = store.axis(axis, pairs=pairs, reach=reach)
     factor = detail.levels.factor(number)[axes].astype(np.float64)
     box = np.column_stack([part.low[axes] / factor, part.high[axes] / factor])
     visible = store.visible_box()
@@ -203,6 +219,7 @@ def _level(
         _on_voxels(box).ravel(),
         seen.ravel(),
         runs.size[2],
+        runs.size[0],
     )
 
 

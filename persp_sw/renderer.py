@@ -16,9 +16,14 @@ from .eye_image import EyeImage
 from .geometry.faces import Face
 from .geometry.regions import Regions
 from .geometry.view import Eye, View, Wall
+from .optics.appearance import Appearance
 from .optics.classification import Classification
+from .optics.classification2d import classify
+from .optics.look import Look
 from .optics.presets import choose
+from .optics.shadows import Shadows
 from .optics.transfer import TransferFunction
+from .optics.transfer2d import TransferFunction2D
 from .planning import EyePlan, plan_eye
 from .quality.features import SceneFeatures, features_of
 from .sampling import choose_sampling
@@ -48,6 +53,8 @@ class Renderer:
         Which part is shown.
     progress
         Called as progress(done, total, what) while the volume is encoded.
+    look
+        Lights, and what gradients do to the transfer function; None: neither.
 
     All of these but the volume may be changed at any time by assigning to the attribute of that name; what
     has to be encoded anew is, when next needed.
@@ -65,17 +72,20 @@ class Renderer:
     def __init__(
         self,
         volume: Volume,
-        transfer: TransferFunction | None = None,
+        transfer: TransferFunction | TransferFunction2D | None = None,
         settings: Settings | None = None,
         regions: Regions | None = None,
         progress: Callable[[int, int, str], None] | None = None,
+        look: Look | None = None,
     ):
         self.volume = volume
         self.settings = settings or Settings()
         self.regions = regions or Regions()
+        self.look = look or Look()
         self.last: dict[str, Any] = {}
+        self._shadowed: tuple[Any, Shadows] | None = None
         self._transfer = transfer or choose(volume).transfer
-        self._classification = Classification.of(self._transfer, volume)
+        self._classification = classify(self._transfer, volume)
         self._classified = 0
         self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
         self.detail = DetailStore(volume, self._visibility(), progress, self._stored())
@@ -91,14 +101,14 @@ class Renderer:
         return self.detail.store(0)
 
     @property
-    def transfer(self) -> TransferFunction:
+    def transfer(self) -> TransferFunction | TransferFunction2D:
         """The transfer function; assigning another drops what was encoded for this one."""
         return self._transfer
 
     @transfer.setter
-    def transfer(self, transfer: TransferFunction | None) -> None:
+    def transfer(self, transfer: TransferFunction | TransferFunction2D | None) -> None:
         self._transfer = transfer or choose(self.volume).transfer
-        self._classification = Classification.of(self._transfer, self.volume)
+        self._classification = classify(self._transfer, self.volume)
         self._classified += 1
         self.detail.classify(self._visibility(), self._stored())
 
@@ -145,9 +155,12 @@ class Renderer:
     def _composite(self, plan: Callable[[], EyePlan], cancel: Cancel | None) -> EyeImage:
         compiled, encoded = _jit.compile_seconds(), self.detail.encode_seconds
         start = perf_counter()
-        image = composite_eye(self.detail, self._classification, self.regions, self.settings, plan(), cancel)
+        appearance = Appearance(self._classification, self.look, self._shadows())
+        shadowed = perf_counter() - start - (_jit.compile_seconds() - compiled)
+        image = composite_eye(self.detail, appearance, self.regions, self.settings, plan(), cancel)
         spent = perf_counter() - start
-        compiled, encoded = _jit.compile_seconds() - compiled, self.detail.encode_seconds - encoded
+        compiled = _jit.compile_seconds() - compiled
+        encoded = self.detail.encode_seconds - encoded + shadowed
         self.last = {
             "encode_ms": 1e3 * encoded,
             "composite_ms": 1e3 * max(spent - encoded - compiled, 0.0),
@@ -232,6 +245,16 @@ class Renderer:
         if (self._skipping, self._packing) != (self.settings.skip_empty, self.settings.pack_runs):
             self._skipping, self._packing = self.settings.skip_empty, self.settings.pack_runs
             self.detail.classify(self._visibility(), self._stored())
+
+    def _shadows(self) -> Shadows | None:
+        """Those of the present transfer function, look and regions; made when they have changed."""
+        lighting = self.look.lighting
+        if lighting is None or not any(light.shadows for light in lighting.lights):
+            return None
+        of = self._classification, self.look, self.regions
+        if self._shadowed is None or self._shadowed[0] != of:
+            self._shadowed = of, Shadows(self.volume, *of)
+        return self._shadowed[1]
 
     def _visibility(self) -> Classification | EverythingVisible:
         return self._classification if self.settings.skip_empty else EverythingVisible()

@@ -10,9 +10,10 @@ from views import DIRECTIONS, direction, face_view, view_of
 from persp_sw import Regions, TransferFunction, View, Volume, reference
 from persp_sw._jit import VECTORS
 from persp_sw.kernels import packet_preintegrated_portable as portable
-from persp_sw.kernels.packet import SCRATCH, IntegralTable
+from persp_sw.kernels.packet import SCRATCH
 from persp_sw.kernels.packet_preintegrated_portable import STEPS
 from persp_sw.kernels.state import SECOND, SECTIONS, TILE, VALUE
+from persp_sw.kernels.tables import IntegralTable
 from persp_sw.measure.exact import Slab
 from persp_sw.optics.classification import Classification
 from persp_sw.volume.levels import STANDARD_AXES, standard_rows

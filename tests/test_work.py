@@ -87,7 +87,7 @@ def test_the_planes_of_a_scanline_are_those_whose_interval_meets_what_is_seen(si
         limits = np.array([rng.uniform(0, 60), rng.uniform(60, 150)])
         level = Level(
             none, none, none, none.astype(np.int64), np.zeros(64, np.uint8), factor, 1 / factor,
-            np.array([0, 30.0, 0, 30, 0, slices - 1]), np.array([j_0, j_1, k_0, k_1]), slices,
+            np.array([0, 30.0, 0, 30, 0, slices - 1]), np.array([j_0, j_1, k_0, k_1]), slices, 31,
         )  # fmt: skip
         face = np.zeros(11)
         face[6], face[7] = e_k, sign
@@ -115,5 +115,5 @@ def test_what_zones_and_faces_have_in_common_is_prepared_once(monkeypatch):
     renderer = Renderer(placed(synthetic_ct(64)), FOG, Settings(quality=0.25))
     image = renderer.composite(Eye((0.05, 1.5, -0.2)), four_walls(64))
     assert len(image.faces) == 6
-    assert {number for number, *_ in made} >= {0, 1}  # zones blend each two levels
+    assert {number for _, number, *_ in made} >= {0, 1}  # zones blend each two levels
     assert len(made) == len(set(made))

@@ -22,7 +22,7 @@ import numpy as np
 
 from .._jit import byte_now, inlined_kernel, kernel, lean_kernel, parallel_kernel, prange, trailing_zeros
 from .encode import BLOCK, packed_position
-from .packet import SCRATCH, WINDOW, blend, sample
+from .packet import SCRATCH, WINDOW, blend, illuminate, reach_of, sample
 from .scanline import (
     BASE,
     CORNER,
@@ -58,7 +58,19 @@ from .scanline import (
     plane_range,
     window,
 )
-from .state import ALPHA, ENOUGH, LENGTH, RAY_FAR, RAY_NEAR, SECOND, SECTIONS, TILE, VALUE
+from .state import (
+    ALPHA,
+    ENOUGH,
+    LENGTH,
+    LIGHT_OF_SECOND,
+    LIGHT_SECTIONS,
+    RAY_FAR,
+    RAY_NEAR,
+    SECOND,
+    SECTIONS,
+    TILE,
+    VALUE,
+)
 
 _F = np.float32
 _NONE, _ONE, _BLOCK = np.uint64(0), np.uint64(1), np.uint64(BLOCK)
@@ -97,8 +109,8 @@ class Tiles(NamedTuple):
 
     states [tile]; strides [tile]: a tile takes the planes whose number has none of these bits, or the highest
     alone where planes lie in the middle; reach [tile,
-    2]: nearest and farthest distance of any of its pixels; lanes: `SECTIONS` of 16 floats a tile; ranges,
-    slots, scratch, cells: of the tile at work.
+    2]: nearest and farthest distance of any of its pixels; lanes: `SECTIONS` of 16 floats a tile, and the
+    light's; ranges, slots, scratch, cells: of the tile at work.
     """
 
     states: np.ndarray
@@ -120,7 +132,7 @@ def _new_tiles(number):
         np.empty(number, np.int64),
         np.empty(number, np.int64),
         np.empty((number, 2), np.float64),
-        np.empty(number * TILE * SECTIONS, np.float32),
+        np.zeros(TILE * (number * SECTIONS + LIGHT_SECTIONS), np.float32),
         np.empty(3 * TILE, np.float64),
         np.zeros((2, 4), np.float32),
         np.empty(SCRATCH, np.float32),
@@ -215,6 +227,17 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
         near,
         far,
     )
+    ray = (
+        _F(face[ORIGIN_I] + (pixel + 0.5) * face[PITCH]),
+        _F(face[PITCH]),
+        _F(t_j),
+        _F(face[SIGN]),
+    )
+    light = np.uint64(TILE * SECTIONS * tiles.states.shape[0])
+    # A sample's place, which pre-integration leaves outside its cell.
+    y = planes[ROW, p] + min(max(planes[ROW_WEIGHT, p], 0.0), 1.0)
+    z = planes[SLICE, p] + min(max(planes[SLICE_WEIGHT, p], 0.0), 1.0)
+    span = np.uint64(WINDOW - 1) - np.uint64(2) * reach_of(table)
     samples = 0
     block = first // _BLOCK
     while block * _BLOCK < end:
@@ -227,7 +250,7 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
         until = block + trailing_zeros(~(bits >> skipped))
         begin, stop = max(block * _BLOCK, first), min(until * _BLOCK, end)
         while begin < stop:
-            window_end = min(stop, begin + np.uint64(WINDOW - 1))
+            window_end = min(stop, begin + span)
             at_00 = packed_position(level.needed, level.offsets, j, k, begin)
             at_10 = packed_position(level.needed, level.offsets, j + _ONE, k, begin)
             at_01, at_11 = at_00, at_10
@@ -240,12 +263,16 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
                 _F(last_cell - start), _F(begin - first), _F(window_end - first), path, table, scratch, cells,
                 lanes, at, SECOND if waiting else VALUE,
             )  # fmt: skip
+            illuminate(
+                n, begin, window_end, y, z, x_first, step, low, high, ray, level, table, scratch, cells,
+                lanes, at, SECOND if waiting else VALUE, light, LIGHT_OF_SECOND if waiting else _NONE,
+            )  # fmt: skip
             slot = _ONE if waiting else _NONE
             tiles.slots[slot, 0], tiles.slots[slot, 1] = near, far
             tiles.slots[slot, 2], tiles.slots[slot, 3] = planes[SHARE, p], planes[SLOPE, p]
             samples += n
             begin = window_end
-            if waiting and blend(n, table, tiles.slots, scratch, cells, lanes, at):
+            if waiting and blend(n, table, tiles.slots, scratch, cells, lanes, at, light):
                 return samples, False, True
             waiting = not waiting
         block = until
@@ -257,7 +284,8 @@ def _blend_last(n, table, tiles, at):
     """Blend a sample that waits for another in vain; returns whether all is opaque."""
     for l in range(np.uint64(n)):  # noqa: E741
         tiles.lanes[np.uint64(at) + SECOND + l] = _F(np.nan)
-    return blend(n, table, tiles.slots, tiles.scratch, tiles.cells, tiles.lanes, at)
+    light = np.uint64(TILE * SECTIONS * tiles.states.shape[0])
+    return blend(n, table, tiles.slots, tiles.scratch, tiles.cells, tiles.lanes, at, light)
 
 
 @lean_kernel
@@ -388,7 +416,7 @@ def composite(rays, per_interval, fine, coarse, table, residual, workers, cancel
     fine, coarse
         `scanline.Level`.
     table
-        Transfer function: `packet.Table`, or `packet.IntegralTable`, which needs `pairs` and MIDDLE.
+        Transfer function: one of `tables`; integrals need `pairs` and MIDDLE, a lit one runs with its reach.
     residual
         A packet stops when all its pixels let through no more than this.
     workers

@@ -17,7 +17,8 @@ from .._jit import bits_of, inlined_kernel, kernel, parallel_kernel, popcount, p
 BLOCK = 4  # cells in a block
 WORD = 64  # blocks in a word
 
-_ONE, _TWO = np.uint64(1), np.uint64(2)
+_NONE, _ONE, _TWO = np.uint64(0), np.uint64(1), np.uint64(2)
+_LAST = np.uint64(WORD - 1)
 _TILE = 64  # scanlines turned at a time: a cache line of 8-bit voxels
 _APART = 64  # voxels between them: powers of two would share a few lines of the cache
 
@@ -67,14 +68,26 @@ def _run_ends(needed, j, k, w):
     return word & ~following
 
 
+@inlined_kernel
+def _visible_near(visible, j_first, j_end, k_first, k_end, w):
+    """Word w of what is visible in any of these scanline pairs, which may lie beyond the volume."""
+    word = _NONE
+    for j in range(max(j_first, 0), min(j_end, visible.shape[0])):
+        for k in range(max(k_first, 0), min(k_end, visible.shape[1])):
+            word |= visible[j, k, w]
+    return word
+
+
 @parallel_kernel
-def mark_needed(visible, pairs, n_i, needed, counts, runs):
+def mark_needed(visible, pairs, reach, n_i, needed, counts, runs):
     """Blocks whose voxels scanline (j, k) must store: those of every visible block that touches it.
 
     Parameters
     ----------
     visible
         Bits of the visible blocks; with `pairs` those of slices k and k + 1.
+    reach
+        Voxels along each axis, 0 … 4, beyond a visible block that are stored, too: its gradients' neighbours.
     n_i
         Voxels of a scanline.
     needed, counts
@@ -83,17 +96,25 @@ def mark_needed(visible, pairs, n_i, needed, counts, runs):
         int64 [n_j], overwritten: number of runs of the scanlines j.
     """
     last = (n_i - 2) // BLOCK  # the last block may be shorter
+    words = needed.shape[2]
     for j in prange(needed.shape[0]):
         ended = 0
         for k in range(needed.shape[1]):
-            k_first = max(k - 1, 0) if pairs else k
-            for w in range(needed.shape[2]):
-                word = np.uint64(0)
-                for row in range(max(j - 1, 0), min(j + 1, visible.shape[0])):
-                    for slice_ in range(k_first, min(k + 1, visible.shape[1])):
-                        word |= visible[row, slice_, w]
+            k_first = k - 1 if pairs else k
+            for w in range(words):
+                word = _visible_near(visible, j - 1, j + 1, k_first, k + 1, w)
+                if reach > 0:
+                    word |= (word << _ONE) | (word >> _ONE)
+                    if w > 0:
+                        word |= _visible_near(visible, j - 1, j + 1, k_first, k + 1, w - 1) >> _LAST
+                    if w + 1 < words:
+                        word |= _visible_near(visible, j - 1, j + 1, k_first, k + 1, w + 1) << _LAST
+                    word |= _visible_near(visible, j - 1 - reach, j + 1 + reach, k_first, k + 1, w)
+                    word |= _visible_near(visible, j - 1, j + 1, k_first - reach, k + 1 + reach, w)
+                    if w == words - 1:
+                        word &= (_TWO << np.uint64(last % WORD)) - _ONE
                 needed[j, k, w] = word
-            for w in range(needed.shape[2]):
+            for w in range(words):
                 word = needed[j, k, w]
                 ends = np.int64(popcount(_run_ends(needed, j, k, w)))
                 count = BLOCK * np.int64(popcount(word)) + ends

@@ -80,7 +80,23 @@ class Floats:
 
     def floor(self) -> Floats:
         """Largest whole number not above."""
-        name = f"llvm.floor.v{TILE}f32"
+        return self._of_each("floor")
+
+    def square_root(self) -> Floats:
+        """NaN of negative numbers."""
+        return self._of_each("sqrt")
+
+    def exponent_and_mantissa(self) -> tuple[Floats, Floats]:
+        """See `_jit.exponent_and_mantissa`."""
+        builder = self.builder
+        bits = builder.bitcast(self.value, _INTS)
+        exponent = builder.and_(builder.lshr(bits, _integers(23)), _integers(0xFF))
+        exponent = builder.sitofp(builder.sub(exponent, _integers(127)), _FLOATS)
+        mantissa = builder.or_(builder.and_(bits, _integers(0x7FFFFF)), _integers(0x3F800000))
+        return self._new(exponent), self._new(builder.bitcast(mantissa, _FLOATS))
+
+    def _of_each(self, operation: str) -> Floats:
+        name = f"llvm.{operation}.v{TILE}f32"
         function = self.builder.module.globals.get(name) or ir.Function(
             self.builder.module, ir.FunctionType(_FLOATS, [_FLOATS]), name
         )
@@ -89,6 +105,10 @@ class Floats:
     def to_integers(self) -> ir.Value:
         """`<16 x i32>`, rounded towards zero; the lanes must be numbers."""
         return self.builder.fptosi(self.value, _INTS)
+
+
+def _integers(number: int) -> ir.Constant:
+    return ir.Constant(_INTS, [number] * TILE)
 
 
 def where(mask: ir.Value, one: Floats, other: Floats | float) -> Floats:
@@ -169,6 +189,15 @@ def look_up_column(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, colum
     return result
 
 
+def any_set(builder: ir.IRBuilder, flags: ir.Value, rows: ir.Value) -> ir.Value:
+    """Whether any of flags[rows], bytes, is not 0."""
+    result = ir.Constant(ir.IntType(8), 0)
+    for lane in range(TILE):
+        row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
+        result = builder.or_(result, builder.load(builder.gep(flags, [row])))
+    return builder.icmp_unsigned("!=", result, ir.Constant(ir.IntType(8), 0))
+
+
 def to_floats(builder: ir.IRBuilder, integers: ir.Value) -> Floats:
     """`<16 x i32>` as floats."""
     return Floats(builder, builder.sitofp(integers, _FLOATS))
@@ -208,8 +237,8 @@ def _transposed(builder: ir.IRBuilder, rows: list[ir.Value]) -> list[ir.Value]:
 
 def power_of_two(builder: ir.IRBuilder, shifted: Floats) -> Floats:
     """2^n where `shifted` = 1.5·2^23 + n, n whole, −126 … 127: n stands in the mantissa's low bits."""
-    bits = builder.shl(builder.bitcast(shifted.value, _INTS), ir.Constant(_INTS, [23] * TILE))
-    bias = ir.Constant(_INTS, [((127 - 0x4B400000) << 23) & 0xFFFFFFFF] * TILE)
+    bits = builder.shl(builder.bitcast(shifted.value, _INTS), _integers(23))
+    bias = _integers(((127 - 0x4B400000) << 23) & 0xFFFFFFFF)
     return Floats(builder, builder.bitcast(builder.add(bits, bias), _FLOATS))
 
 

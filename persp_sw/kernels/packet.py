@@ -1,15 +1,17 @@
-"""Packets, 16 neighbouring pixels on one sample plane: which kernels sample and blend them.
+"""Packets, 16 neighbouring pixels on one sample plane: which kernels sample, light and blend them.
 
 A `Table` classifies the scalar in a plane; an `IntegralTable` takes the mean over the scalars on the piece of
-the ray that the plane stands for. `composite` is compiled for the one or the other.
+the ray that the plane stands for; lit ones do the same and look at gradients, too. `composite` is compiled
+for each of them when it is first used.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 
 from .._jit import VECTORS, inlined_kernel, kernel_by_type
 from . import packet_portable
+from .packet_lit import light_up, shows_classified, shows_integrated
+from .phong import REACH
+from .tables import IntegralTable, LitIntegralTable, LitTable
 
 if VECTORS:
     from . import packet_preintegrated_vector as integrated
@@ -22,26 +24,6 @@ WINDOW = packet_portable.WINDOW
 SCRATCH = 4 * packet_portable.SCRATCH  # floats; four lines of a packet's voxels
 
 
-class Table(NamedTuple):
-    """A transfer function; see `optics.classification.Classification`."""
-
-    rows: np.ndarray
-    origin: np.float32
-    scale: np.float32
-
-
-class IntegralTable(NamedTuple):
-    """A transfer function's integrals; see `optics.preintegration.Preintegration`."""
-
-    sums: np.ndarray
-    beyond: np.ndarray
-    origin: np.float32
-    scale: np.float32
-    end: np.float32
-    unit: np.float32
-    steps: np.float32
-
-
 def sample(
     n, width, voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell,
     begin, end, path, table, scratch, cells, lanes, at, section,
@@ -52,9 +34,25 @@ def sample(
     raise NotImplementedError
 
 
-def blend(n, table, slots, scratch, cells, lanes, at):
+def reach_of(table):
+    """Cells beyond those of a packet's window that it looks at. Compiled code only."""
+    raise NotImplementedError
+
+
+def illuminate(
+    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
+    sample_at,
+):  # fmt: skip
+    """Find what gradients change of the samples in `section`, if a `table` asks for it and they show
+    anything; see `packet_lit.light_up`. Compiled code only.
+    """
+    raise NotImplementedError
+
+
+def blend(n, table, slots, scratch, cells, lanes, at, light):
     """Lay two samples of each pixel under what is there, front to back; true if no pixel lets enough light
-    through to go on. See `packet_portable.blend`. Compiled code only.
+    through to go on. See `packet_portable.blend`; `light`: where the light's sections begin. Compiled code
+    only.
     """
     raise NotImplementedError
 
@@ -71,12 +69,73 @@ def _sample_classified(
 
 
 @inlined_kernel
-def _blend_classified(n, table, slots, scratch, cells, lanes, at):
+def _blend_classified(n, table, slots, scratch, cells, lanes, at, light):
     return classified.blend(n, table.rows, table.origin, table.scale, slots, scratch, cells, lanes, at)
 
 
-def _is_integral(table):
-    return table.instance_class is IntegralTable
+@inlined_kernel
+def _blend_integrated(n, table, slots, scratch, cells, lanes, at, light):
+    return integrated.blend(n, table, slots, scratch, cells, lanes, at)
+
+
+@inlined_kernel
+def _blend_lit(n, table, slots, scratch, cells, lanes, at, light):
+    last = table.seen.shape[0] - 1
+    return classified.blend_lit(
+        n, table.rows, table.origin, table.scale, last, slots, scratch, cells, lanes, at, light
+    )
+
+
+@inlined_kernel
+def _blend_lit_integrated(n, table, slots, scratch, cells, lanes, at, light):
+    return integrated.blend_lit(n, table, slots, scratch, cells, lanes, at, light)
+
+
+@inlined_kernel
+def _no_reach(table):
+    return np.uint64(0)
+
+
+@inlined_kernel
+def _lit_reach(table):
+    return np.uint64(np.ceil(table.numbers[REACH]))
+
+
+@inlined_kernel
+def _no_light(
+    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
+    sample_at,
+):  # fmt: skip
+    return
+
+
+@inlined_kernel
+def _light_classified(
+    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
+    sample_at,
+):  # fmt: skip
+    if shows_classified(n, table, cells, lanes, np.uint64(at), section):
+        light_up(
+            n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
+            np.uint64(at), light, sample_at,
+        )  # fmt: skip
+
+
+@inlined_kernel
+def _light_integrated(
+    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
+    sample_at,
+):  # fmt: skip
+    if shows_integrated(n, table, cells, lanes, np.uint64(at), section):
+        light_up(
+            n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
+            np.uint64(at), light, sample_at,
+        )  # fmt: skip
+
+
+def _by_kind(table, classified, integrated, lit, lit_integrated):
+    kinds = {IntegralTable: integrated, LitTable: lit, LitIntegralTable: lit_integrated}
+    return kinds.get(table.instance_class, classified)
 
 
 @kernel_by_type(sample)
@@ -84,9 +143,22 @@ def _choose_sample(
     n, width, voxels, at_00, at_10, at_01, at_11, weight_j, weight_k, x, step, low, high, last_cell,
     begin, end, path, table, scratch, cells, lanes, at, section,
 ):  # fmt: skip
-    return integrated.sample if _is_integral(table) else _sample_classified
+    return _by_kind(table, _sample_classified, integrated.sample, _sample_classified, integrated.sample)
+
+
+@kernel_by_type(reach_of)
+def _choose_reach(table):
+    return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_reach)
+
+
+@kernel_by_type(illuminate)
+def _choose_light(
+    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
+    sample_at,
+):  # fmt: skip
+    return _by_kind(table, _no_light, _no_light, _light_classified, _light_integrated)
 
 
 @kernel_by_type(blend)
-def _choose_blend(n, table, slots, scratch, cells, lanes, at):
-    return integrated.blend if _is_integral(table) else _blend_classified
+def _choose_blend(n, table, slots, scratch, cells, lanes, at, light):
+    return _by_kind(table, _blend_classified, _blend_integrated, _blend_lit, _blend_lit_integrated)

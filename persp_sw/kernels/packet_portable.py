@@ -16,12 +16,21 @@ from .state import (
     EXP2_COEFFICIENTS,
     GREEN,
     LENGTH,
+    LIGHT_OF_SECOND,
+    LIT_BLUE,
+    LIT_GREEN,
+    LIT_RED,
     MINUS_LOG2E,
     RAY_FAR,
     RAY_NEAR,
     RED,
     ROUNDER,
     SECOND,
+    SHINE_BLUE,
+    SHINE_GREEN,
+    SHINE_RED,
+    SKIPPED,
+    THICKER,
     VALUE,
 )
 
@@ -77,17 +86,31 @@ def sample(
 
 
 @inlined_kernel
-def _blend_one(n, table, origin, scale, values, slot, scratch, cells, lanes, at):
-    """One of the two samples of `blend`."""
+def light_colours(n, scratch, lanes, light):
+    """The colours in scratch[0 …], n a channel, as light makes them."""
+    red, green, blue = np.uint64(0), np.uint64(n), np.uint64(2 * n)
+    for l in range(np.uint64(n)):  # noqa: E741
+        scratch[red + l] = scratch[red + l] * lanes[light + LIT_RED + l] + lanes[light + SHINE_RED + l]
+        scratch[green + l] = (
+            scratch[green + l] * lanes[light + LIT_GREEN + l] + lanes[light + SHINE_GREEN + l]
+        )
+        scratch[blue + l] = scratch[blue + l] * lanes[light + LIT_BLUE + l] + lanes[light + SHINE_BLUE + l]
+
+
+@inlined_kernel
+def _blend_one(n, table, origin, scale, last_row, values, slot, scratch, cells, lanes, at, light):
+    """One of the two samples of `blend`; `light`: where its sections begin, or None."""
     pixel = np.uint64(at)
     near, far = slot[0], slot[1]
     share_0, slope = slot[2] * MINUS_LOG2E, slot[3] * (_F(0.5) * MINUS_LOG2E)
-    last = _F(table.shape[0] - 1)
+    last = _F(last_row)
     for l in range(np.uint64(n)):  # noqa: E741
         value = lanes[pixel + values + l]
         entry = (value - origin) * scale + _F(1.5)
         entry = entry if entry > _F(1.0) else _F(1.0)
         entry = entry if entry < last else last
+        if light is not None:
+            entry += lanes[light + SKIPPED + l]
         entry = entry if value == value else _F(0.0)  # NaN: nothing
         cells[l] = np.int32(entry)
     red, green, blue, extinctions = np.uint64(0), np.uint64(n), np.uint64(2 * n), np.uint64(3 * n)
@@ -97,6 +120,10 @@ def _blend_one(n, table, origin, scale, values, slot, scratch, cells, lanes, at)
         scratch[green + l] = table[row, 1]
         scratch[blue + l] = table[row, 2]
         scratch[extinctions + l] = table[row, 3]
+    if light is not None:
+        for l in range(np.uint64(n)):  # noqa: E741
+            scratch[extinctions + l] *= lanes[light + THICKER + l]
+        light_colours(n, scratch, lanes, light)
     going = False
     for l in range(np.uint64(n)):  # noqa: E741
         begin = lanes[pixel + RAY_NEAR + l]
@@ -132,5 +159,14 @@ def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     ranges are; the share of the extinction at `base`, and how it grows with the distance. True if no pixel
     lets enough light through to go on.
     """
-    _blend_one(n, table, origin, scale, VALUE, slots[0], scratch, cells, lanes, at)
-    return _blend_one(n, table, origin, scale, SECOND, slots[1], scratch, cells, lanes, at)
+    last = table.shape[0] - 1
+    _blend_one(n, table, origin, scale, last, VALUE, slots[0], scratch, cells, lanes, at, None)
+    return _blend_one(n, table, origin, scale, last, SECOND, slots[1], scratch, cells, lanes, at, None)
+
+
+@inlined_kernel
+def blend_lit(n, table, origin, scale, last, slots, scratch, cells, lanes, at, light):
+    """As `blend`, with what `phong.shade` left in the light's sections; `last`: row of a magnitude's last."""
+    second = light + LIGHT_OF_SECOND
+    _blend_one(n, table, origin, scale, last, VALUE, slots[0], scratch, cells, lanes, at, light)
+    return _blend_one(n, table, origin, scale, last, SECOND, slots[1], scratch, cells, lanes, at, second)

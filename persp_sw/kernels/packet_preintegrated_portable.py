@@ -21,7 +21,7 @@ step beyond.
 import numpy as np
 
 from .._jit import inlined_kernel, power_of_two
-from .packet_portable import CHUNK
+from .packet_portable import CHUNK, light_colours
 from .packet_portable import SCRATCH as LINE
 from .state import (
     ALPHA,
@@ -31,6 +31,7 @@ from .state import (
     FAR_ROW,
     GREEN,
     LENGTH,
+    LIGHT_OF_SECOND,
     MINUS_LN2,
     MINUS_LOG2E,
     RAY_FAR,
@@ -38,6 +39,7 @@ from .state import (
     RED,
     ROUNDER,
     SECOND,
+    THICKER,
     THIN,
     VALUE,
     VALUE_END,
@@ -131,8 +133,8 @@ def sample(
 
 
 @inlined_kernel
-def _blend_one(n, table, section, slot, scratch, lanes, at):
-    """One of the two samples of `blend`."""
+def _blend_one(n, table, section, slot, scratch, lanes, at, light):
+    """One of the two samples of `blend`; `light`: where its sections begin, or None."""
     sums, beyond, end, steps = table.sums, table.beyond, table.end, table.steps
     pixel, size = np.uint64(at), np.uint64(n)
     near, far = slot[0], slot[1]
@@ -164,6 +166,8 @@ def _blend_one(n, table, section, slot, scratch, lanes, at):
         length = ends - begins
         length = length if length > _F(0.0) else _F(0.0)
         share = share_0 + slope * (begins + ends)
+        if light is not None:
+            share *= lanes[light + THICKER + l]
         y = total * table.unit / count * (lanes[pixel + LENGTH + l] * length) * share
         y = y if y > _F(-126.0) else _F(-126.0)
         shifted = y + ROUNDER
@@ -204,6 +208,8 @@ def _blend_one(n, table, section, slot, scratch, lanes, at):
             colour = before * beyond[side, c] + rest * beyond[_ONE - side, c]
             colour += sign * _F(sums[row, c] - sums[begin, c])
             scratch[np.uint64(channel) * size + l] = colour * reciprocal
+    if light is not None:
+        light_colours(n, scratch, lanes, light)
     going = False
     for l in range(size):  # noqa: E741
         accumulated = lanes[pixel + ALPHA + l]
@@ -220,5 +226,12 @@ def _blend_one(n, table, section, slot, scratch, lanes, at):
 @inlined_kernel
 def blend(n, table, slots, scratch, cells, lanes, at):
     """As `packet_portable.blend`, of the rows that `sample` left."""
-    _blend_one(n, table, VALUE, slots[0], scratch, lanes, at)
-    return _blend_one(n, table, SECOND, slots[1], scratch, lanes, at)
+    _blend_one(n, table, VALUE, slots[0], scratch, lanes, at, None)
+    return _blend_one(n, table, SECOND, slots[1], scratch, lanes, at, None)
+
+
+@inlined_kernel
+def blend_lit(n, table, slots, scratch, cells, lanes, at, light):
+    """As `packet_portable.blend_lit`, of the rows that `sample` left."""
+    _blend_one(n, table, VALUE, slots[0], scratch, lanes, at, light)
+    return _blend_one(n, table, SECOND, slots[1], scratch, lanes, at, light + LIGHT_OF_SECOND)

@@ -5,7 +5,7 @@ import numpy as np
 from .._jit import inlined_kernel, intrinsic, types
 from . import lanes as simd
 from .packet_preintegrated_portable import EDGE, STEPS
-from .packet_vector import NARROW, Tile, pick, pointer, section_at, slot_of, word
+from .packet_vector import NARROW, Light, Tile, pick, pointer, section_at, slot_of, word
 from .state import (
     FAR_ROW,
     MINUS_LN2,
@@ -151,10 +151,11 @@ class _Piece:
         self.count = (highest - lowest).at_least(1.0)
         self.rising, self.builder, self.tile, self.entries, self.end = rising, builder, tile, entries, end
 
-    def colour_and_opacity(self, slot, unit, steps):
-        """Three channels, not premultiplied, and α."""
+    def colour_and_opacity(self, slot, unit, steps, light=None):
+        """Three channels, not premultiplied, and α; as `light` makes them."""
         builder, sign, inside = self.builder, self.sign, self.inside
-        y = self.tile.depth(self.total * unit / self.count, *slot)
+        extinction = self.total * unit / self.count
+        y = self.tile.depth(extinction * light.thicker if light else extinction, *slot)
         alpha = self.tile.opacity(y)
         wanted = _seen_part(y * float(MINUS_LN2), alpha) * self.total
         ahead = self.ahead.at_most(wanted)
@@ -169,10 +170,11 @@ class _Piece:
         )
         rest = simd.where(whole, (within - inside).at_least(0.0), 0.0)
         reciprocal = 1.0 / (ahead + amount + rest).at_least(1.0)
-        return [
+        colour = [
             (ahead * self.before[n] + channel + rest * self.behind[n]) * reciprocal
             for n, channel in enumerate(colour)
-        ], alpha
+        ]
+        return light.on(colour) if light else colour, alpha
 
 
 def _seen_part(depth, alpha):
@@ -181,40 +183,52 @@ def _seen_part(depth, alpha):
     return simd.where(depth < float(THIN), 1.0 - depth * (1.0 / 6.0), thick)
 
 
-@intrinsic
-def _blend(_context, sums, beyond, end, unit, steps, one, other, lanes, at):
-    def build(context, builder, signature, arguments):
-        entries = pointer(context, builder, signature.args[0], arguments[0])
-        tile = Tile(builder, pointer(context, builder, signature.args[7], arguments[7]), arguments[8])
-        outside = pointer(context, builder, signature.args[1], arguments[1])
-        numbers = [simd.everywhere(builder, scalar) for scalar in arguments[2:5]]
-        beyond = [
-            [
-                simd.everywhere(builder, builder.load(builder.gep(outside, [word(4 * side + n)])))
-                for n in range(4)
+def _blender(lit):
+    """The blending of two samples, plain or lit."""
+
+    @intrinsic
+    def blend_two(_context, sums, beyond, end, unit, steps, one, other, lanes, at, light):
+        def build(context, builder, signature, arguments):
+            entries = pointer(context, builder, signature.args[0], arguments[0])
+            state = pointer(context, builder, signature.args[7], arguments[7])
+            tile = Tile(builder, state, arguments[8])
+            lights = [Light(builder, state, arguments[9], n) if lit else None for n in range(2)]
+            outside = pointer(context, builder, signature.args[1], arguments[1])
+            beyond = [
+                [
+                    simd.everywhere(builder, builder.load(builder.gep(outside, [word(4 * side + n)])))
+                    for n in range(4)
+                ]
+                for side in range(2)
             ]
-            for side in range(2)
-        ]
-        end, unit, steps = numbers
-        pieces = [
-            _Piece(builder, tile, entries, beyond, end, sections)
-            for sections in ((VALUE, VALUE_END), (SECOND, SECOND_END))
-        ]
-
-        def lay():
-            slots = [
-                [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
-                for slot in arguments[5:7]
+            end, unit, steps = (simd.everywhere(builder, scalar) for scalar in arguments[2:5])
+            pieces = [
+                _Piece(builder, tile, entries, beyond, end, sections)
+                for sections in ((VALUE, VALUE_END), (SECOND, SECOND_END))
             ]
-            both = (p.colour_and_opacity(slot, unit, steps) for p, slot in zip(pieces, slots, strict=True))
-            return tile.blend(*zip(*both, strict=True))
 
-        # Packets in cells that may be seen, but see nothing themselves, end here: 0.89 of the time.
-        return simd.where_any(builder, (pieces[0].total + pieces[1].total) > 0.0, lay)
+            def lay():
+                slots = [
+                    [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
+                    for slot in arguments[5:7]
+                ]
+                both = (
+                    piece.colour_and_opacity(slot, unit, steps, light)
+                    for piece, slot, light in zip(pieces, slots, lights, strict=True)
+                )
+                return tile.blend(*zip(*both, strict=True))
 
-    slot = types.UniTuple(types.float32, 4)
-    arguments = (sums, beyond, *[types.float32] * 3, slot, slot, lanes, types.int64)
-    return types.boolean(*arguments), build
+            # Packets in cells that may be seen, but see nothing themselves, end here: 0.89 of the time.
+            return simd.where_any(builder, (pieces[0].total + pieces[1].total) > 0.0, lay)
+
+        slot = types.UniTuple(types.float32, 4)
+        arguments = (sums, beyond, *[types.float32] * 3, slot, slot, lanes, types.int64, types.int64)
+        return types.boolean(*arguments), build
+
+    return blend_two
+
+
+_blend, _blend_lit = _blender(False), _blender(True)
 
 
 @inlined_kernel
@@ -222,5 +236,14 @@ def blend(n, table, slots, scratch, cells, lanes, at):
     """See `packet_preintegrated_portable.blend`."""
     return _blend(
         table.sums, table.beyond, table.end, table.unit, table.steps, slot_of(slots, _NONE),
-        slot_of(slots, _ONE), lanes, at,
+        slot_of(slots, _ONE), lanes, at, 0,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def blend_lit(n, table, slots, scratch, cells, lanes, at, light):
+    """See `packet_preintegrated_portable.blend_lit`."""
+    return _blend_lit(
+        table.sums, table.beyond, table.end, table.unit, table.steps, slot_of(slots, _NONE),
+        slot_of(slots, _ONE), lanes, at, np.int64(light),
     )  # fmt: skip

@@ -16,12 +16,21 @@ from .state import (
     EXP2_COEFFICIENTS,
     GREEN,
     LENGTH,
+    LIGHT_OF_SECOND,
+    LIT_BLUE,
+    LIT_GREEN,
+    LIT_RED,
     MINUS_LOG2E,
     RAY_FAR,
     RAY_NEAR,
     RED,
     ROUNDER,
     SECOND,
+    SHINE_BLUE,
+    SHINE_GREEN,
+    SHINE_RED,
+    SKIPPED,
+    THICKER,
     TILE,
     VALUE,
 )
@@ -186,30 +195,70 @@ class Tile:
         return simd.none(self.builder, accumulated < self.read(ENOUGH))
 
 
-@intrinsic
-def _blend(_context, table, origin, scale, last, one, other, lanes, at):
-    def build(context, builder, signature, arguments):
-        entries = pointer(context, builder, signature.args[0], arguments[0])
-        state, at = pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
-        origin, scale, last = (simd.everywhere(builder, scalar) for scalar in arguments[1:4])
-        slots = [
-            [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
-            for slot in arguments[4:6]
-        ]
+class Light:
+    """What gradients change of one of two samples; where its sections begin in the tile's state."""
 
-        def entry_of(value):
-            entry = ((value - origin) * scale + 1.5).at_least(1.0).at_most(last)
-            return simd.where(value.is_number(), entry, 0.0).to_integers()
+    def __init__(self, builder, state, at, number):
+        self._tile = Tile(builder, state, section_at(builder, at, number * int(LIGHT_OF_SECOND)))
 
-        tile = Tile(builder, state, at)
-        rows = [entry_of(tile.read(section)) for section in (VALUE, SECOND)]
-        colours = [simd.look_up(builder, entries, row) for row in rows]
-        alphas = [tile.opacity(tile.depth(colour[3], *slots[n])) for n, colour in enumerate(colours)]
-        return tile.blend(colours, alphas)
+    @property
+    def thicker(self):
+        """The factor of the extinction."""
+        return self._tile.read(THICKER)
 
-    slot = types.UniTuple(types.float32, 4)
-    arguments = (table, *[types.float32] * 3, slot, slot, lanes, types.int64)
-    return types.boolean(*arguments), build
+    @property
+    def skipped(self):
+        """Rows of the table before those of the sample's magnitude."""
+        return self._tile.read(SKIPPED)
+
+    def on(self, colour):
+        """Three channels as light makes them."""
+        sections = zip(
+            colour, (LIT_RED, LIT_GREEN, LIT_BLUE), (SHINE_RED, SHINE_GREEN, SHINE_BLUE), strict=True
+        )
+        return [channel * self._tile.read(lit) + self._tile.read(shine) for channel, lit, shine in sections]
+
+
+def _blender(lit):
+    """The blending of two samples, plain or lit."""
+
+    @intrinsic
+    def blend_two(_context, table, origin, scale, last, one, other, lanes, at, light):
+        def build(context, builder, signature, arguments):
+            table_rows = pointer(context, builder, signature.args[0], arguments[0])
+            state, at = pointer(context, builder, signature.args[6], arguments[6]), arguments[7]
+            origin, scale, last = (simd.everywhere(builder, scalar) for scalar in arguments[1:4])
+            slots = [
+                [simd.everywhere(builder, builder.extract_value(slot, n)) for n in range(4)]
+                for slot in arguments[4:6]
+            ]
+            lights = [Light(builder, state, arguments[8], n) for n in range(2)]
+            tile = Tile(builder, state, at)
+            values = [tile.read(section) for section in (VALUE, SECOND)]
+            entries = [((value - origin) * scale + 1.5).at_least(1.0).at_most(last) for value in values]
+            if lit:
+                entries = [e + light.skipped for e, light in zip(entries, lights, strict=True)]
+            rows = [
+                simd.where(value.is_number(), entry, 0.0).to_integers()
+                for value, entry in zip(values, entries, strict=True)
+            ]
+            looked_up = [simd.look_up(builder, table_rows, row) for row in rows]
+            colours = [colour[:3] for colour in looked_up]
+            extinctions = [colour[3] for colour in looked_up]
+            if lit:
+                colours = [light.on(colour) for light, colour in zip(lights, colours, strict=True)]
+                extinctions = [e * light.thicker for e, light in zip(extinctions, lights, strict=True)]
+            alphas = [tile.opacity(tile.depth(e, *slots[n])) for n, e in enumerate(extinctions)]
+            return tile.blend(colours, alphas)
+
+        slot = types.UniTuple(types.float32, 4)
+        arguments = (table, *[types.float32] * 3, slot, slot, lanes, types.int64, types.int64)
+        return types.boolean(*arguments), build
+
+    return blend_two
+
+
+_blend, _blend_lit = _blender(False), _blender(True)
 
 
 @inlined_kernel
@@ -223,4 +272,11 @@ def slot_of(slots, n):
 def blend(n, table, origin, scale, slots, scratch, cells, lanes, at):
     """See `packet_portable.blend`."""
     last = np.float32(table.shape[0] - 1)
-    return _blend(table, origin, scale, last, slot_of(slots, _NONE), slot_of(slots, _ONE), lanes, at)
+    return _blend(table, origin, scale, last, slot_of(slots, _NONE), slot_of(slots, _ONE), lanes, at, 0)
+
+
+@inlined_kernel
+def blend_lit(n, table, origin, scale, last, slots, scratch, cells, lanes, at, light):
+    """See `packet_portable.blend_lit`."""
+    one, other = slot_of(slots, _NONE), slot_of(slots, _ONE)
+    return _blend_lit(table, origin, scale, np.float32(last), one, other, lanes, at, np.int64(light))

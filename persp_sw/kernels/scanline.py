@@ -46,7 +46,7 @@ class Level(NamedTuple):
     volume that one voxel of the level is, along i, j and k; per_voxel: 1 / factor. box: float64 [i0, i1, j0,
     j1, k0, k1], the shown
     part in the level's voxels; look-ups along i and j are clamped to it. seen: float64 [j0, j1, k0, k1], the
-    part of it with anything visible. slices: how many.
+    part of it with anything visible. slices, columns: how many along k and i.
     """
 
     visible: np.ndarray
@@ -59,6 +59,7 @@ class Level(NamedTuple):
     box: np.ndarray
     seen: np.ndarray
     slices: np.int64
+    columns: np.int64
 
 
 class Chunk(NamedTuple):

@@ -13,6 +13,19 @@ TILE = 16  # pixels in a tile: one 512-bit vector of floats
 )  # fmt: skip
 SECTIONS = 12
 
+# What gradients make of the two samples being composited, of the tile at work alone: factors of the colour,
+# what is added to that, the factor of the extinction, and how many rows of the table the gradient's magnitude
+# skips. Then room to work: the scalars of its neighbours on both sides along i, j and k, and later
+# its normal, the ray's direction, the cosine between normal and eye, the normal's square, the factor of the
+# colour before it is lit, and what is left of a light.
+(
+    LIT_RED, LIT_GREEN, LIT_BLUE, SHINE_RED, SHINE_GREEN, SHINE_BLUE, THICKER, SKIPPED,
+) = (np.uint64(TILE * n) for n in range(8))  # fmt: skip
+LIGHT_OF_SECOND = np.uint64(TILE * 8)
+NEIGHBOURS = np.uint64(TILE * 16)
+NORMAL, DIRECTION, COSINE, SQUARE, TINT, LEFT = (np.uint64(TILE * n) for n in (22, 25, 28, 29, 30, 31))
+LIGHT_SECTIONS = 32
+
 # α = 1 − 2^y is taken as 1 − 2^n·(1 + q) with q = 2^f − 1 = f·(c1 + f·(c2 + …)), |f| ≤ ½, the Taylor series
 # of exp(f·ln 2), remainder below 6e-9: no cancellation, so the faintest media keep their relative accuracy.
 MINUS_LOG2E = np.float32(-1.4426950408889634)

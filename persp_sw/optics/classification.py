@@ -65,6 +65,14 @@ class Classification:
         seen = np.concatenate([[0], np.cumsum(table[:, 3] > 0)]).astype(np.int64)
         return cls(table, seen, float(np.ldexp(origin, lift)), float(np.ldexp(scale, -lift)))
 
+    @property
+    def rows(self) -> NDArray[np.float32]:
+        """`table` for each magnitude that is told apart, one after the other: here for one, which is any."""
+        return self.table
+
+    magnitudes = 1
+    per_magnitude = 0.0
+
     @cached_property
     def integrals(self) -> Preintegration:
         """The table's integrals, made when they are first asked for."""

@@ -49,6 +49,7 @@ class AxisRuns:
     offsets: NDArray[np.int64]
     voxels: NDArray[np.generic]
     run_count: int
+    reach: int = 0  # voxels stored beyond what is visible, along each axis
 
     @property
     def has_pairs(self) -> bool:
@@ -136,15 +137,16 @@ class RunStore:
         """What can be seen; another object after each `classify`."""
         return self._visibility
 
-    def axis(self, axis: int, *, pairs: bool = False) -> AxisRuns:
+    def axis(self, axis: int, *, pairs: bool = False, reach: int = 0) -> AxisRuns:
         """Runs of principal axis 0 (x), 1 (y) or 2 (z), encoded now if need be.
 
-        `pairs`: also for samples between slices, which see a few blocks more.
+        `pairs`: also for samples between slices, which see a few blocks more. `reach`: with so many voxels
+        around, 0 … 4, for gradients.
         """
         runs = self._axes.get(axis)
-        if runs is None or (pairs and not runs.has_pairs):
+        if runs is None or (pairs and not runs.has_pairs) or reach > runs.reach:
             with self._timed():
-                runs = self._axes[axis] = self._encode(axis, pairs)
+                runs = self._axes[axis] = self._encode(axis, pairs, reach)
         return runs
 
     def visible_box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
@@ -209,7 +211,7 @@ class RunStore:
         encode.mark_visible(low, high, *visible_intervals(visibility, self.volume), visible)
         return visible
 
-    def _encode(self, axis: int, pairs: bool) -> AxisRuns:
+    def _encode(self, axis: int, pairs: bool, reach: int) -> AxisRuns:
         n_j, n_k, n_i = standard_rows(self.volume, axis).shape
         self._report(0, axis)
         bounds = self.bounds.of(axis)
@@ -224,7 +226,7 @@ class RunStore:
         needed = np.empty((n_j, n_k, visible.shape[2]), np.uint64)
         counts = np.empty(needed.shape, np.int64)
         runs = np.empty(n_j, np.int64)
-        encode.mark_needed(stored, pairs, n_i, needed, counts, runs)
+        encode.mark_needed(stored, pairs, reach, n_i, needed, counts, runs)
         ends = PADDING + np.cumsum(counts.reshape(-1))
         offsets = (ends - counts.reshape(-1)).reshape(counts.shape)
         self._report(2, axis)
@@ -233,4 +235,5 @@ class RunStore:
         if needed.size:
             _PACK[axis](self.volume.data, needed, offsets, voxels)
         self._report(3, axis)
-        return AxisRuns((n_i, n_j, n_k), visible, between, needed, offsets, voxels, int(runs.sum()))
+        size = n_i, n_j, n_k
+        return AxisRuns(size, visible, between, needed, offsets, voxels, int(runs.sum()), reach)

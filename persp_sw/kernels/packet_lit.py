@@ -1,0 +1,106 @@
+"""What gradients do to a packet: found where the transfer function shows something, and nowhere else.
+
+The gradient is that of the interpolated field, by central differences of neighbours `REACH` voxels away along
+each axis. At a border of the volume the neighbours are where it ends, and their difference is divided by how
+far apart they are.
+"""
+
+import numpy as np
+
+from .._jit import VECTORS, inlined_kernel, lean_kernel
+from .packet_portable import WINDOW
+from .phong import PER_SHADOW, REACH, SHADOW, START
+from .state import LEFT, NEIGHBOURS, TILE
+
+if VECTORS:
+    from .packet_lit_vector import add_light, find_slopes, shade, shows_classified, shows_integrated
+    from .packet_vector import sample
+else:
+    from .packet_lit_portable import find_slopes, shows_classified, shows_integrated
+    from .packet_portable import sample
+    from .phong import add_light, shade
+
+__all__ = ["light_up", "shows_classified", "shows_integrated"]
+
+_F = np.float32
+_NONE = np.uint64(0)
+_BEFORE = 128  # `volume.runs.PADDING`
+_ALL = _F(1 / 65535)
+
+
+@inlined_kernel
+def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cells, lanes, light):
+    """How much is left of a light at the packet's samples; see `Shade.shadows`."""
+    lefts, room = light + LEFT, light + NEIGHBOURS
+    for l in range(np.uint64(n)):  # noqa: E741
+        lanes[lefts + l] = _F(1.0)
+    one, size, per = shades.lights[number], shades.shadow_size, np.float64(shades.numbers[PER_SHADOW])
+    shadow = np.int64(one[SHADOW])
+    if shadow < 0:
+        return
+    n_i, n_j, n_k = size[0], size[1], size[2]
+    x_0 = (x * level.factor[0] + one[START]) * per
+    step = step * level.factor[0] * per
+    low, high = (low * level.factor[0] + one[START]) * per, (high * level.factor[0] + one[START]) * per
+    low, high = max(low, 0.0), min(max(high, 0.0), n_i - 1.0)
+    y = min(max((y * level.factor[1] + one[START + 1]) * per, 0.0), n_j - 1.0)
+    z = min(max((z * level.factor[2] + one[START + 2]) * per, 0.0), n_k - 1.0)
+    j, k = min(np.int64(y), n_j - 2), min(np.int64(z), n_k - 2)
+    at_00 = _BEFORE + ((shadow * n_j + j) * n_k + k) * n_i
+    first = np.int64(min(max(x_0, low), high))
+    end = min(np.int64(min(max(x_0 + (TILE - 1) * step, low), high)) + 1, n_i - 1)
+    first = min(first, end - 1)
+    while first < end:
+        last = min(first + WINDOW - 1, end)
+        start = np.float64(first)
+        sample(
+            n, last - first + 1, shades.shadows, at_00 + first, at_00 + n_k * n_i + first,
+            at_00 + n_i + first, at_00 + (n_k + 1) * n_i + first, _F(y - j), _F(z - k), _F(x_0 - start),
+            _F(step), _F(low - start), _F(high - start), _F(n_i - 2.0 - start), _F(0.0), _F(last - first),
+            scratch, cells, lanes, np.int64(room),
+        )  # fmt: skip
+        for l in range(np.uint64(n)):  # noqa: E741
+            found = lanes[room + l]
+            lanes[lefts + l] = found * _ALL if found == found else lanes[lefts + l]
+        first = last
+
+
+@lean_kernel
+def light_up(
+    n, begin, end, y, z, x, step, low, high, ray, level, shades, scratch, cells, lanes, at, light, sample_at
+):
+    """Light's sections of a packet's samples from their gradients; see `phong.shade`.
+
+    Parameters
+    ----------
+    begin, end
+        The cells of a row that show anything.
+    y, z, x, step, low, high
+        Where the samples are, in the level's voxels: scanline, slice, and x + l·step along i, clamped to
+        [low, high].
+    ray
+        float32 (t_i of lane 0, its growth a lane, t_j, sign), in the volume's voxels.
+    shades
+        A lit table of `tables`.
+    light, sample_at
+        Where the light's sections begin in `lanes`, and the sample's among them.
+    """
+    reach = np.float64(shades.numbers[REACH])
+    pad = np.uint64(np.ceil(reach))
+    n_i, n_j, n_k = level.columns, level.needed.shape[0], level.needed.shape[1]
+    first = begin - pad if begin > pad else _NONE
+    last = min(end + pad, np.uint64(n_i - 1))
+    sides = (
+        max(y - reach, 0.0),
+        min(y + reach, n_j - 1.0),
+        max(z - reach, 0.0),
+        min(z + reach, n_k - 1.0),
+    )
+    slopes = light + NEIGHBOURS
+    find_slopes(
+        n, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
+    )  # fmt: skip
+    shade(n, ray, slopes, shades, lanes, at, light, sample_at)
+    for number in range(shades.lights.shape[0]):
+        _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cells, lanes, light)
+        add_light(n, number, shades, lanes, light, sample_at)

@@ -1,0 +1,76 @@
+"""A look in the numbers that kernels take."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kernels import phong
+from ..kernels.phong import Shade
+from ..volume.gradient import FAINTEST, largest_magnitude, world_from_differences
+from ..volume.grid import Volume
+from ..volume.lift import lift_exponent
+from .classification import Classification
+from .lighting import Lighting
+from .look import Look, Modulation
+
+if TYPE_CHECKING:
+    from .shadows import Shadows
+
+
+def shade_of(
+    look: Look,
+    volume: Volume,
+    axes: list[int],
+    classification: Classification,
+    shadows: Shadows | None = None,
+) -> Shade:
+    """What gradients do to a transfer function, in the standard space of these axes (i, j, k).
+
+    Kernels see values as `volume.lift` brings them near 1, and so do these numbers.
+    """
+    lighting, modulation = look.lighting, look.modulation or Modulation(opacity=0, colour=0)
+    largest = float(np.ldexp(largest_magnitude(volume, look.gradient_distance), lift_exponent(volume)))
+    numbers = np.zeros(phong.NUMBERS, np.float32)
+    numbers[phong.REACH] = look.gradient_distance
+    # No gradient at all has no normal, but must not divide by zero.
+    numbers[phong.FAINT] = max((FAINTEST * largest) ** 2, float(np.finfo(np.float32).tiny))
+    if largest > 0:
+        numbers[phong.LOW] = modulation.low * largest
+        numbers[phong.PER_WEIGHT] = 1 / ((modulation.high - modulation.low) * largest)
+    numbers[phong.THICKENED], numbers[phong.COLOURED] = modulation.opacity, modulation.colour
+    numbers[phong.ROWS], numbers[phong.MAGNITUDES] = len(classification.table), classification.magnitudes
+    numbers[phong.PER_MAGNITUDE] = classification.per_magnitude
+    numbers[phong.OWN] = 1.0 if lighting is None else lighting.emissive + lighting.ambient
+    numbers[phong.PER_SHADOW] = 0 if shadows is None else 1 / shadows.factor
+    lighting = lighting or Lighting(diffuse=0, specular=0)
+    numbers[phong.POWER] = lighting.power
+    numbers[phong.TWO_SIDED], numbers[phong.BLINN] = lighting.two_sided, lighting.model == "blinn"
+    normal_from_slopes = -world_from_differences(volume)[:, axes]
+    return Shade(
+        numbers,
+        _colours(lighting, lighting.headlight),
+        _lights(lighting, volume, axes),
+        np.ascontiguousarray(normal_from_slopes, np.float32),
+        np.ascontiguousarray(volume.world_from_object[:3, axes], np.float32),
+        np.zeros(1, np.uint16) if shadows is None else shadows.standard(tuple(axes)),
+        np.zeros(3, np.int64) if shadows is None else shadows.size(tuple(axes)),
+    )
+
+
+def _colours(lighting: Lighting, colour: tuple[float, float, float]) -> NDArray[np.float32]:
+    """(6,): what of a light's colour is reflected in all directions, and what is mirrored."""
+    return np.outer([lighting.diffuse, lighting.specular], colour).astype(np.float32).ravel()
+
+
+def _lights(lighting: Lighting, volume: Volume, axes: list[int]) -> NDArray[np.float32]:
+    object_from_world = np.linalg.inv(volume.world_from_object[:3, :3])
+    offset = lighting.shadow_offset * min(volume.spacing)
+    rows, shadows = [], 0
+    for light in lighting.lights:
+        number, shadows = (shadows, shadows + 1) if light.shadows else (-1, shadows)
+        start = (object_from_world @ light.direction * offset)[axes]
+        rows.append([*light.direction, *_colours(lighting, light.colour), number, *start])
+    return np.array(rows, np.float32).reshape(-1, phong.LIGHT_COLUMNS)
