@@ -34,8 +34,10 @@ from ._stretch import (
 
 _ROOT15 = np.sqrt(15.0)
 _LEAST_HALVINGS = 2  # of a piece: what only the gradient decides shows at no break of the values
-# A bend between an end of a half panel and its first place hides ½ · 0.056² of the slope there: twice the
-# mean slope, at both ends, this part of what the colour changes over the panel.
+# All of an opaque panel's light comes from its first part, where no place may be: in its own shadow, then.
+_DEEPEST = 2.0
+# A bend between an end of a half panel and its first place hides ½ · 0.056² of the slope there: of twice
+# the mean slope, at both ends, this part of what the colour changes over the panel.
 _HIDDEN = 0.006
 
 # Columns of a panel: where, level, steps and bends at both ends, extinction and colour at three places.
@@ -229,7 +231,9 @@ def _integrate(scene, ray, where, n, state):
         change = max(change, max(abs(red_12 - red), max(abs(green_12 - green), abs(blue_12 - blue))))
         change = max(change, _hidden(whole, front, back, opacity))
         transmittance = np.exp(-state[DEPTH])
-        if level < MAX_HALVINGS and (change * transmittance > scene.limit or level < _LEAST_HALVINGS):
+        coarse = level < _LEAST_HALVINGS or change * transmittance > scene.limit
+        deep = depth_12 > _DEEPEST and transmittance > scene.limit
+        if level < MAX_HALVINGS and (coarse or deep):
             # The front half is next; the back half waits in the place of the whole.
             panels[top] = back
             top += 1
