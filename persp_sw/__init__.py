@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from .geometry.view import Eye, View, Wall
     from .measure.trace import FrameRecord, TraceWriter
     from .measure.trace_reading import read_trace
+    from .optics.joint_histogram import JointHistogram
     from .optics.lighting import Light, Lighting
     from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
+    from .optics.transfer2d import Box, TransferFunction2D, Triangle
     from .planning import EyePlan
     from .quality.controller import Choice, FrameTimeController
     from .quality.features import FrameCost, SceneFeatures
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from .warp.texture import TextureWarp
 
 __all__ = [
+    "Box",
     "Cancel",
     "Cancelled",
     "Canvas",
@@ -50,6 +53,7 @@ __all__ = [
     "FrameRecord",
     "FrameTimeController",
     "Framebuffer",
+    "JointHistogram",
     "Ladder",
     "Light",
     "Lighting",
@@ -66,6 +70,8 @@ __all__ = [
     "TextureWarp",
     "TraceWriter",
     "TransferFunction",
+    "TransferFunction2D",
+    "Triangle",
     "View",
     "Volume",
     "Wall",
@@ -79,6 +85,7 @@ __all__ = [
 __version__ = "0.1.0"
 
 _HOME = {
+    "Box": ".optics.transfer2d",
     "Cancel": ".cancel",
     "Cancelled": ".cancel",
     "Canvas": ".warp.canvas",
@@ -91,6 +98,7 @@ _HOME = {
     "FrameRecord": ".measure.trace",
     "FrameTimeController": ".quality.controller",
     "Framebuffer": ".warp.framebuffer",
+    "JointHistogram": ".optics.joint_histogram",
     "Ladder": ".quality.ladder",
     "Light": ".optics.lighting",
     "Lighting": ".optics.lighting",
@@ -107,6 +115,8 @@ _HOME = {
     "TextureWarp": ".warp.texture",
     "TraceWriter": ".measure.trace",
     "TransferFunction": ".optics.transfer",
+    "TransferFunction2D": ".optics.transfer2d",
+    "Triangle": ".optics.transfer2d",
     "View": ".geometry.view",
     "Volume": ".volume.grid",
     "Wall": ".geometry.view",

@@ -18,7 +18,9 @@ from .geometry.framing import framed_view
 from .geometry.regions import Regions
 from .geometry.view import View
 from .optics import presets
+from .optics.look import Look
 from .optics.transfer import TransferFunction
+from .optics.transfer2d import TransferFunction2D
 
 if TYPE_CHECKING:
     from .scene_schema import SceneKeys
@@ -63,7 +65,9 @@ class Scene:
         source: str = "the scene",
         progress: Progress | None = None,
     ):
-        from .scene_schema import check  # pydantic takes 0.1 s, which `import persp_sw` need not
+        # pydantic takes 0.1 s, which `import persp_sw` need not
+        from .scene_look import look_problems
+        from .scene_schema import check
 
         self.folder = Path(folder)
         self._given = dict(keys)
@@ -71,7 +75,7 @@ class Scene:
         self._progress = progress
         checked, problems = check(keys)
         if checked is not None:
-            problems = self._cross_check(checked)
+            problems = [*look_problems(checked), *self._cross_check(checked)]
         if problems:
             count = f"{len(problems)} problems" if len(problems) > 1 else "a problem"
             raise SceneError("\n  - ".join([f"{source} has {count}:", *problems]))
@@ -130,14 +134,18 @@ class Scene:
     def preset(self) -> presets.Preset | None:
         """The preset that makes the transfer function, or None where the scene has one of its own."""
         tf = self.keys.tf
+        if self.keys.tf2d is not None:
+            return None
         if tf is None:
             return presets.choose(self.volume)
         return presets.make(tf, self.volume) if isinstance(tf, str) and tf in presets.NAMES else None
 
     @cached_property
-    def transfer(self) -> TransferFunction:
+    def transfer(self) -> TransferFunction | TransferFunction2D:
         """The transfer function, with the scene's `opacity_unit` where it states one."""
         tf, unit = self.keys.tf, self.keys.opacity_unit
+        if self.keys.tf2d is not None:
+            return TransferFunction2D.from_rows(self.keys.tf2d, unit or 1.0)
         if self.preset:
             transfer = self.preset.transfer
         elif isinstance(tf, str):
@@ -145,6 +153,13 @@ class Scene:
         else:
             return TransferFunction.from_rows(tf, unit or 1.0)
         return TransferFunction(transfer.points, unit) if unit else transfer
+
+    @cached_property
+    def look(self) -> Look:
+        """Lights and modulation; plain where the scene has neither."""
+        from .scene_look import look_of
+
+        return look_of(self.keys)
 
     @cached_property
     def regions(self) -> Regions:

@@ -4,33 +4,25 @@ from __future__ import annotations
 
 import difflib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError, field_validator
 
-from .errors import PerspSWError, SceneError
+from .errors import SceneError
 from .geometry.regions import Regions
 from .optics.transfer import TransferFunction
+from .scene_look import GradientKeys, LightKeys, OneLight, ShapeKeys, accepted
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
+Truth = Annotated[bool, Field(strict=True)]
 Count = Annotated[int, Field(strict=True, ge=0)]
 Unit = Annotated[Number, Field(ge=0, le=1)]
 Text = Annotated[str, StringConstraints(min_length=1)]
 Vector3 = tuple[Number, Number, Number]
-
-
-class Light(BaseModel):
-    """Headlight Phong; read and kept for the version that can shade."""
-
-    model_config = ConfigDict(extra="forbid")
-    ambient: Annotated[Number, Field(ge=0)] = 0.2
-    diffuse: Annotated[Number, Field(ge=0)] = 0.8
-    specular: Annotated[Number, Field(ge=0)] = 0.3
-    power: Positive = 20.0
 
 
 class SceneKeys(BaseModel):
@@ -56,8 +48,13 @@ class SceneKeys(BaseModel):
     crop: tuple[Number, Number, Number, Number, Number, Number] | None = None
     crop_flags: Any = "subvolume"  # a name or a number; like `cut`, checked in the words of `Regions`
     cut: list[Any] = []
-    shade: Annotated[bool, Field(strict=True)] = False
-    light: Light = Light()
+    # Lit, and shown by the gradient; `scene_look` has the words for these.
+    tf2d: Annotated[list[ShapeKeys], Field(min_length=1)] | None = None
+    shade: Truth = False
+    light: LightKeys = LightKeys()
+    lights: list[OneLight] = []
+    shadows: Truth | None = None
+    gradient: GradientKeys = GradientKeys()
     background: tuple[Unit, Unit, Unit] = (0.0, 0.0, 0.0)
     # Where from.
     eye: Vector3 | None = None
@@ -81,7 +78,7 @@ class SceneKeys(BaseModel):
             raise ValueError(
                 "expected rows [[value, r, g, b, a], …], a preset's name or the path of a saved function"
             )
-        return _accepted(TransferFunction.from_rows, value)
+        return accepted(TransferFunction.from_rows, value)
 
     @field_validator("component")
     @classmethod
@@ -100,29 +97,22 @@ class SceneKeys(BaseModel):
     @field_validator("clip")
     @classmethod
     def _clip(cls, value: Any) -> Any:
-        return _accepted(lambda clip: Regions(clip=clip), value)
+        return accepted(lambda clip: Regions(clip=clip), value)
 
     @field_validator("crop")
     @classmethod
     def _crop(cls, value: Any) -> Any:
-        return _accepted(lambda crop: Regions(crop=crop), value)
+        return accepted(lambda crop: Regions(crop=crop), value)
 
     @field_validator("crop_flags")
     @classmethod
     def _crop_flags(cls, value: Any) -> Any:
-        return _accepted(lambda flags: Regions(crop=[0] * 6, crop_flags=flags), value)
+        return accepted(lambda flags: Regions(crop=[0] * 6, crop_flags=flags), value)
 
     @field_validator("cut")
     @classmethod
     def _cut(cls, value: Any) -> Any:
-        return _accepted(lambda cut: Regions(cut=cut), value)
-
-    @field_validator("shade")
-    @classmethod
-    def _shade(cls, value: bool) -> bool:
-        if value:
-            raise ValueError("shading is not available yet; remove the key or set it to false")
-        return value
+        return accepted(lambda cut: Regions(cut=cut), value)
 
 
 def read_text(path: Path) -> dict:
@@ -154,15 +144,6 @@ def check(keys: Mapping[str, Any]) -> tuple[SceneKeys | None, list[str]]:
         return SceneKeys.model_validate(_plain(keys)), []
     except ValidationError as error:
         return None, list(dict.fromkeys(_sentence(problem) for problem in error.errors()))
-
-
-def _accepted(make: Callable[[Any], object], value: Any) -> Any:
-    """`value`, if `make` takes it; its complaint as the ValueError that pydantic collects, if not."""
-    try:
-        make(value)
-    except PerspSWError as error:
-        raise ValueError(str(error)) from None
-    return value
 
 
 def _toml(text: str) -> dict:
@@ -201,6 +182,7 @@ _WANTED = {
     "bool_type": "expected true or false",
     "string_type": "expected text",
     "list_type": "expected a list",
+    "model_type": "expected keys and values {…}",
     "tuple_type": "expected a list of numbers",
     "finite_number": "expected a finite number",
     "string_too_short": "expected text that is not empty",
@@ -213,7 +195,8 @@ def _sentence(problem: Any) -> str:
     name = str(place[0]) + "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place[1:])
     context = problem.get("ctx", {})
     if kind == "extra_forbidden":
-        known = list(Light.model_fields if len(place) > 1 else SceneKeys.model_fields)
+        inner = {"light": LightKeys, "lights": OneLight, "gradient": GradientKeys}
+        known = list((inner[place[0]] if len(place) > 1 else SceneKeys).model_fields)
         near = difflib.get_close_matches(str(place[-1]).lower(), known, 1, 0.5)
         advice = f"did you mean {near[0]}?" if near else f"the keys are {', '.join(known)}"
         return f"{name}: unknown key; {advice}"
@@ -221,13 +204,16 @@ def _sentence(problem: Any) -> str:
         if isinstance(place[-1], int):
             parent = name.rpartition("[")[0]
             return f"{parent}: too few numbers; given {_short(given)}"
-        return f"{name}: this key is missing; give the path of a volume file"
+        advice = "; give the path of a volume file" if place == ("volume",) else ""
+        return f"{name}: this key is missing{advice}"
     if kind == "value_error":
         return f"{name}: {context['error']}"
     if kind in _WANTED:
         wanted = _WANTED[kind]
     elif kind == "too_long":
         wanted = f"expected {context['max_length']} numbers, not {context['actual_length'] or 'more'}"
+    elif kind == "too_short":
+        wanted = f"expected at least {context['min_length']}"
     elif kind == "literal_error":
         wanted = f"expected {context['expected']}"
     elif kind in ("greater_than", "greater_than_equal", "less_than", "less_than_equal"):

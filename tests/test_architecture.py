@@ -36,6 +36,7 @@ RANKS = {
     "persp_sw.renderer": 4,
     "persp_sw.measure": 4,
     "persp_sw.scene": 5,
+    "persp_sw.scene_look": 5,
     "persp_sw.scene_schema": 5,
     "persp_sw.commands": 6,
     "persp_sw.cli": 7,

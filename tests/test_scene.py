@@ -29,8 +29,11 @@ FULL = {
     "frames": 4,
     "eye_step": [1, 0, -1],
     "step": 0.5,
-    "shade": False,
-    "light": {"ambient": 0.3},
+    "shade": True,
+    "light": {"ambient": 0.3, "headlight": [0.5, 0.4, 0.3], "model": "blinn"},
+    "lights": [{"direction": [1, 2, 3]}, {"direction": [0, 0, -2], "colour": [2, 1, 0], "shadows": False}],
+    "shadows": True,
+    "gradient": {"distance": 1.5, "high": 0.5, "opacity": 0.8},
     "clip": [[1, 0, 0, -3]],
     "crop": [0, 20, 1, 21, 2, 22],
     "crop_flags": "fence",
@@ -238,7 +241,6 @@ def test_all_problems_are_listed_at_once(ball_file: Path):
         ("eyestep", [0, 0, 1], "did you mean eye_step?"),
         ("fov", 30, "did you mean fovy?"),
         ("zzz", 1, "the keys are volume, name"),
-        ("shade", True, "shading is not available yet; remove the key or set it to false"),
         ("shade", "yes", "expected true or false"),
         ("tf", "ct_bones", "did you mean ct_bone?"),
         ("tf", 7, "a preset's name"),
@@ -306,6 +308,7 @@ def test_saving_where_one_cannot(ball_file: Path):
 def test_the_contract_has_all_its_keys():
     # DESIGN, "Scene file", word for word.
     contract = (
-        "volume spacing tf eye centre up fovy size frames eye_step step shade light clip crop background"
+        "volume spacing tf eye centre up fovy size frames eye_step step shade light clip crop background "
+        "cut crop_flags lights shadows gradient tf2d opacity_unit name max_seconds"
     )
-    assert {*contract.split(), "opacity_unit", "name", "max_seconds"} <= set(SceneKeys.model_fields)
+    assert set(contract.split()) <= set(SceneKeys.model_fields)

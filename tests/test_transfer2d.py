@@ -126,9 +126,11 @@ def test_files_that_are_none(tmp_path, text):
         (lambda: replace(TRIANGLE, magnitudes=(3, 1)), "a triangle's magnitudes"),
         (
             lambda: Function.from_rows([{"shape": "box", "values": [1, 2]}]),
-            "shape 0, a box, has values, magn",
+            "a box needs magnitudes, colour, opacity",
         ),
-        (lambda: Function.from_rows([{"shape": "disc"}]), 'shape 0 is {"shape": "box" or "triangle"'),
+        (lambda: Function.from_rows([{"shape": "disc"}]), 'a shape is {"shape": "box" or "triangle"'),
+        (lambda: Function.from_rows([{"shape": "box", "color": RED}]), r"no color; did you mean colour\?"),
+        (lambda: Function.from_rows([{"shape": "triangle", "q": 1}]), "no q; its keys are value, magnitudes"),
         (lambda: Function.from_rows({"shape": "box"}), "tf2d is a list of shapes"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
@@ -213,7 +214,7 @@ class TransferFunction2D:
         """From {"shape": "box" or "triangle", …the shape's parameters}, as in scene files."""
         if not isinstance(rows, Iterable) or isinstance(rows, str | Mapping):
             raise TransferFunctionError(f"tf2d is a list of shapes; given {shown(rows)}")
-        return cls([_shape_of(n, row) for n, row in enumerate(rows)], opacity_unit)
+        return cls([shape_of(row) for row in rows], opacity_unit)
 
     def save(self, path: str | Path) -> None:
         """Write as JSON."""
@@ -262,13 +263,19 @@ def _listed(keys: dict[str, Any]) -> dict[str, Any]:
     return {key: list(value) if isinstance(value, tuple) else value for key, value in keys.items()}
 
 
-def _shape_of(n: int, row: Mapping[str, Any]) -> Shape:
+def shape_of(row: Mapping[str, Any]) -> Shape:
+    """A shape from {"shape": "box" or "triangle", …}; TransferFunctionError where it is none."""
     kind = row.get("shape") if isinstance(row, Mapping) else None
     if not isinstance(kind, str) or kind not in _KINDS:
-        raise TransferFunctionError(f'shape {n} is {{"shape": "box" or "triangle", …}}; given {shown(row)}')
+        raise TransferFunctionError(f'a shape is {{"shape": "box" or "triangle", …}}; given {shown(row)}')
     keys = [field.name for field in fields(_KINDS[kind])]
     given = {key: value for key, value in row.items() if key != "shape"}
+    for key in given:
+        if key not in keys:
+            near = difflib.get_close_matches(str(key).lower(), keys, 1, 0.5)
+            advice = f"did you mean {near[0]}?" if near else f"its keys are {', '.join(keys)}"
+            raise TransferFunctionError(f"a {kind} has no {key}; {advice}")
     missing = [key for key in keys if key not in given and key != "soft"]
-    if missing or not set(given) <= set(keys):
-        raise TransferFunctionError(f"shape {n}, a {kind}, has {', '.join(keys)}; given {shown(row)}")
+    if missing:
+        raise TransferFunctionError(f"a {kind} needs {', '.join(missing)}; given {shown(row)}")
     return _KINDS[kind](**given)
