@@ -44,6 +44,7 @@ class LightKeys(BaseModel):
     headlight: Any = 1.0
     two_sided: Any = True
     model: Any = "phong"
+    shadow_offset: Any = 2.0
 
     @field_validator("*")
     @classmethod

@@ -46,7 +46,7 @@ def cosine(volume, towards):
 
 def matt(towards, shadows=True):
     light = Light(tuple(towards), shadows=shadows)
-    return Look(Lighting(0.25, 0.8, 0.0, headlight=0, lights=(light,), two_sided=False))
+    return Look(Lighting(0.25, 0.8, 0.0, headlight=0, lights=(light,), two_sided=False, shadow_offset=0))
 
 
 def lit_haze(volume, towards, depths):
@@ -121,7 +121,7 @@ def test_the_near_distance_hides_from_the_eye_only():
 def test_the_headlight_casts_none():
     volume = noise()
     view = view_of(volume, "front")
-    lighting = Lighting(lights=(), headlight=0.7)
+    lighting = Lighting(lights=(), headlight=0.7, shadow_offset=0)
     parallel = View.parallel(view.eye.position, volume.centre, (0, 1, 0), 12, (16, 12))
     at_the_eye = tuple(parallel.eye.position)
     alone = reference.render(volume, STEPS, parallel, look=Look(lighting), tolerance=1e-9)
@@ -156,7 +156,9 @@ def seen_from_above(**changes):
     volume = ball_over_plane()
     opaque = TransferFunction([(-1, COLOUR, 0), (0, COLOUR, 0), (0, COLOUR, 1)], 1e-4)
     view = View.parallel((11.5, 11, 60), (11.5, 11, 0), (0, 1, 0), 20, (48, 48))
-    look = Look(Lighting(0.2, 0.8, 0.0, headlight=0, lights=(Light(tuple(SUN), shadows=True),)))
+    look = Look(
+        Lighting(0.2, 0.8, 0.0, headlight=0, lights=(Light(tuple(SUN), shadows=True),), shadow_offset=0)
+    )
     image = reference.render(volume, opaque, view, look=look, tolerance=1e-4, **changes)
     places = view.starts() * (1, 1, 0) + (0, 0, PLANE)
     beside = np.hypot(*(places - BALL)[..., :2].transpose(2, 0, 1)) > BALL_RADIUS + 0.2
@@ -251,7 +253,7 @@ SOFT = TransferFunction2D([Box((40, 220), (0, 110), (1, 0.5, 0.2), 0.3, 1.0)], 1
 def test_numpy_twin(transfer, modulation, distance):
     volume = noise()
     lights = (replace(LIGHTS[0], shadows=True), LIGHTS[1], replace(LIGHTS[2], shadows=True))
-    look = Look(Lighting(lights=lights, headlight=0.2, power=8), modulation, distance)
+    look = Look(Lighting(lights=lights, headlight=0.2, power=8, shadow_offset=0), modulation, distance)
     view = view_of(volume, "corner")
     image = reference.render(volume, transfer, view, look=look, tolerance=1e-4)
     unshadowed = replace(look, lighting=replace(look.lighting, lights=LIGHTS))
@@ -265,6 +267,6 @@ def test_numpy_twin(transfer, modulation, distance):
 def test_a_tenth_of_the_tolerance_changes_less_than_the_tolerance(transfer, modulation):
     volume = noise()
     view = view_of(volume, "front", (8, 6))
-    look = Look(Lighting(lights=(replace(LIGHTS[0], shadows=True),)), modulation)
+    look = Look(Lighting(lights=(replace(LIGHTS[0], shadows=True),), shadow_offset=0), modulation)
     images = [reference.render(volume, transfer, view, look=look, tolerance=t) for t in (3e-3, 3e-4)]
     assert largest(images[0] - images[1]) < 3e-3
