@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .measure.trace import FrameRecord, TraceWriter
     from .measure.trace_reading import read_trace
     from .optics.joint_histogram import JointHistogram
+    from .optics import editing
     from .optics.lighting import Light, Lighting
     from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
@@ -76,6 +77,7 @@ __all__ = [
     "Volume",
     "Wall",
     "__version__",
+    "editing",
     "images",
     "ladder_for",
     "load",
@@ -124,11 +126,12 @@ _HOME = {
     "load": ".volume.files",
     "read_trace": ".measure.trace_reading",
 }
+_MODULES = {"editing": ".optics.editing", "images": ".images", "reference": ".reference"}
 
 
 def __getattr__(name: str) -> object:
-    if name in ("images", "reference"):  # modules
-        return import_module(f".{name}", __name__)
+    if name in _MODULES:
+        return import_module(_MODULES[name], __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(_HOME[name], __name__), name)
