@@ -102,14 +102,14 @@ class Renderer:
 
     @property
     def transfer(self) -> TransferFunction | TransferFunction2D:
-        """The transfer function; assigning another drops what was encoded for this one."""
+        """The transfer function; assigning another drops what was encoded, if other values are visible."""
         return self._transfer
 
     @transfer.setter
     def transfer(self, transfer: TransferFunction | TransferFunction2D | None) -> None:
         self._transfer = transfer or choose(self.volume).transfer
-        self._classification = classify(self._transfer, self.volume)
-        self._classified += 1
+        before, self._classification = self._classification, classify(self._transfer, self.volume)
+        self._classified += not self._classification.hides_like(before)
         self.detail.classify(self._visibility(), self._stored())
 
     def composite(
@@ -205,8 +205,8 @@ class Renderer:
     def features_of_plans(self, plans: Iterable[EyePlan]) -> SceneFeatures:
         """What a frame of these eyes' plans will ask for.
 
-        Another transfer function makes it another scene; other regions do not, for a clip plane may move in
-        every frame.
+        Another transfer function makes it another scene, but where only colours are others; other regions do
+        not, for a clip plane may move in every frame.
         """
         at_one = replace(self.settings, quality=1.0, intermediate_size=None)
         planned = [(plan.geometry, plan.faces(at_one)) for plan in plans]

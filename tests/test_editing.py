@@ -267,3 +267,70 @@ def test_an_added_point_leaves_the_picture_as_it_was_bit_for_bit():
     assert len(renderer.transfer.values) == len(transfer.values) + 1
     assert before.max() > 0.1
     assert (renderer.render(view) == before).all()
+
+
+# --- what an edit asks to be encoded -----------------------------------------------------------------------
+
+
+class Encodings:
+    """A renderer that counts the axes it encodes."""
+
+    def __init__(self, volume: psw.Volume, transfer: psw.TransferFunction, **settings: object):
+        self.count = 0
+        self.renderer = psw.Renderer(volume, transfer, psw.Settings(**settings), progress=self._progress)
+        self.view = psw.Scene.of_volume(volume, size=(48, 40)).view(0)
+
+    def _progress(self, done: int, total: int, what: str) -> None:
+        self.count += what.startswith("encoding") and done == 0
+
+    def picture_of(self, transfer: psw.TransferFunction) -> np.ndarray:
+        self.renderer.transfer = transfer
+        return self.renderer.render(self.view).copy()
+
+
+SHOWN = psw.TransferFunction([(40.0, RED, 0.0), (90.0, GREEN, 0.1), (160.0, BLUE, 0.5)], 1.0)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float32])
+@pytest.mark.parametrize("more", [{}, {"skip_empty": False}, {"pack_runs": False}])
+def test_only_an_edit_of_what_is_visible_encodes_and_of_one_axis(dtype: type, more: dict):
+    volume = psw.Volume(synthetic_ct(24).data.astype(dtype))
+    # A coarser level would count, too; so would the slice pairs that pre-integration of a wall asks for.
+    more = {"level_of_detail": False, "samples_per_interval": 1, "preintegrated": False, **more}
+    one = Encodings(volume, SHOWN, **more)
+    one.renderer.render(one.view)
+    assert one.count == 1
+    edits = {
+        "colour": psw.editing.coloured(SHOWN, 1, BLUE),
+        "opacity": psw.editing.with_opacity(SHOWN, 2, 0.9),
+        "added": psw.editing.added(SHOWN, 100.0)[0],
+        "moved": psw.editing.moved(SHOWN, 0, 60.0),
+    }
+    for name, edited in edits.items():
+        before = one.count
+        picture = one.picture_of(edited)
+        encoded = name == "moved" and more.get("skip_empty", True)
+        assert one.count - before == encoded, name
+        assert (picture == Encodings(volume, edited, **more).picture_of(edited)).all()
+        one.picture_of(SHOWN)
+
+
+def test_another_level_of_detail_keeps_its_runs_too():
+    volume = synthetic_ct(48)
+    one = Encodings(volume, SHOWN, quality=0.1)
+    one.view = psw.Scene.of_volume(volume, size=(24, 20)).view(0)
+    one.renderer.render(one.view)
+    count = one.count
+    assert count >= 2  # coarser levels show
+    one.picture_of(psw.editing.coloured(SHOWN, 1, BLUE))
+    assert one.count == count
+
+
+def test_other_colours_are_no_other_scene_for_the_controller():
+    one = Encodings(synthetic_ct(24), SHOWN)
+    scene = lambda: one.renderer.features([one.view.eye], [one.view.wall]).scene  # noqa: E731
+    first = scene()
+    one.renderer.transfer = psw.editing.coloured(SHOWN, 1, BLUE)
+    assert scene() == first
+    one.renderer.transfer = psw.editing.with_opacity(SHOWN, 1, 0.2)
+    assert scene() != first

@@ -59,7 +59,7 @@ def test_another_transfer_function_is_another_scene():
     before = one.features(eyes, walls).scene
     one.settings = psw.Settings(quality=0.5)
     assert one.features(eyes, walls).scene == before
-    one.transfer = FOG
+    one.transfer = psw.editing.with_opacity(FOG, 0, 0.002)
     assert one.features(eyes, walls).scene != before
 
 

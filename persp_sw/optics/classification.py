@@ -73,6 +73,13 @@ class Classification:
     magnitudes = 1
     per_magnitude = 0.0
 
+    def hides_like(self, other: Classification) -> bool:
+        """Whether both have the same extinction for every value and magnitude: colours alone may differ."""
+        same = (self.origin, self.scale, self.magnitudes, self.per_magnitude) == (
+            other.origin, other.scale, other.magnitudes, other.per_magnitude
+        )  # fmt: skip
+        return same and np.array_equal(self.rows[:, 3], other.rows[:, 3])
+
     @cached_property
     def integrals(self) -> Preintegration:
         """The table's integrals, made when they are first asked for."""

@@ -52,7 +52,7 @@ class DetailStore:
         return self._stores[number]
 
     def classify(self, visibility: Visibility, stored: Visibility | None = None) -> None:
-        """Change what can be seen; everything encoded so far is dropped, the levels are kept."""
+        """Change what can be seen; what was encoded of other voxels is dropped, the levels are kept."""
         self._visibility, self._stored = visibility, stored
         for store in self._stores.values():
             store.classify(visibility, stored)

@@ -103,8 +103,8 @@ class RunStore:
     volume
         At least two voxels along every axis.
     visibility
-        What can be seen; `classify` changes it, and axes are encoded anew when next needed. The blocks'
-        bounds do not depend on it and are kept.
+        What can be seen; `classify` changes it, and axes are encoded anew when next needed, if other voxels
+        can be seen. The blocks' bounds do not depend on it and are kept.
     progress
         Called as progress(steps done, steps, "encoding x") while an axis is encoded.
     stored
@@ -127,10 +127,19 @@ class RunStore:
         self.encode_seconds = 0.0  # spent so far, compilation not counted
 
     def classify(self, visibility: Visibility, stored: Visibility | None = None) -> None:
-        """Change what can be seen; everything encoded so far is dropped."""
-        self._visibility, self._stored = visibility, stored or visibility
-        self._axes.clear()
-        self._box = None
+        """Change what can be seen; everything encoded so far is dropped, but where the same voxels can be.
+
+        Other colours, and opacities of values that were visible before, need no encoding.
+        """
+        before = self._visibility, self._stored
+        self._visibility, self._stored = after = visibility, stored or visibility
+        if not all(self._see_the_same(a, b) for a, b in zip(before, after, strict=True)):
+            self._axes.clear()
+            self._box = None
+
+    def _see_the_same(self, one: Visibility, other: Visibility) -> bool:
+        ends = zip(visible_intervals(one, self.volume), visible_intervals(other, self.volume), strict=True)
+        return all(np.array_equal(a, b) for a, b in ends)
 
     @property
     def visibility(self) -> Visibility:
