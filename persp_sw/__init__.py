@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .measure.trace_reading import read_trace
     from .optics.joint_histogram import JointHistogram
     from .optics import editing
+    from .optics.histogram import value_counts
     from .optics.lighting import Light, Lighting
     from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
@@ -83,6 +84,7 @@ __all__ = [
     "load",
     "read_trace",
     "reference",
+    "value_counts",
 ]
 __version__ = "0.1.0"
 
@@ -125,6 +127,7 @@ _HOME = {
     "ladder_for": ".quality.saved_ladder",
     "load": ".volume.files",
     "read_trace": ".measure.trace_reading",
+    "value_counts": ".optics.histogram",
 }
 _MODULES = {"editing": ".optics.editing", "images": ".images", "reference": ".reference"}
 

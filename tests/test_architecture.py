@@ -55,7 +55,8 @@ VR_RANKS = {
     "shown": 7,
     "beside": 8, "record": 8,
     "cave": 9, "preview": 9,
-    "commands": 10, "examples": 10,
+    "panel": 10,
+    "commands": 11, "examples": 10,
 }  # fmt: skip
 REFERENCE_SEES = {
     "persp_sw.volume.grid",
@@ -84,7 +85,10 @@ RESERVED = {
         *(f"vr_plugin.screen.{name}" for name in ("eye_target", "gl_objects", "shapes")),
     },
     "glfw": {"vr_plugin.window"},
-    "imgui_bundle": {"vr_plugin.panel"},
+    # frontend: context, input and drawing; the others: widgets. What they edit knows nothing of them.
+    "imgui_bundle": {
+        f"vr_plugin.panel.{name}" for name in ("frontend", "sections", "tf_plot", "view_handles")
+    },
     # A host that is not ours, in the example of the plug-in only: nobody needs these packages to use it.
     "moderngl": {f"vr_plugin.examples.moderngl_{part}" for part in ("host", "scene")},
     "moderngl_window": {"vr_plugin.examples.moderngl_host"},

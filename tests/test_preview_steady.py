@@ -112,8 +112,7 @@ class Machine:
             if orbit:
                 self.preview.orbit(orbit)
             self.loop.turn(self.preview.advance(self.now))
-            if self.loop._refiner is not None:
-                assert self.loop._refiner.wait(WAIT)
+            assert self.loop.background.wait(WAIT)
 
     def press(self, keys: str) -> None:
         """Keys, and what follows of them at once."""
@@ -130,7 +129,7 @@ class Machine:
         return [done.statistics["quality"] for _, done in self.shown[start:]]
 
     def close(self) -> None:
-        self.loop._give_up_refining()
+        self.loop.background.give_up()
 
 
 @pytest.fixture
@@ -209,7 +208,7 @@ def test_at_rest_it_refines_to_full_quality_and_then_does_nothing(machine: Calla
     assert len(m.shown) == shown
     assert m.pictures.renderer.last is at_rest  # nothing was composited
     assert m.loop.wait_s > 0.1
-    assert m.loop._refiner is None
+    assert m.loop.background.is_idle
 
 
 def test_motion_brings_quality_back_in_bounded_steps(machine: Callable[..., Machine]):

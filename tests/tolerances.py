@@ -274,3 +274,9 @@ OF_ALPHA = 0.17
 # Rms of a picture whose voxels are stored along other axes: of a hundred rays one runs along an edge of the
 # box or a seam of two faces, where either side may be taken, which differ by up to 0.01 there; 0.01 · √0.01.
 STORED_OTHERWISE = 1e-3
+
+# --- The panel ---------------------------------------------------------------------------------------------
+
+# Of a pixel: positions of widgets and pointers are float32 numbers below 4096, whose steps are 2.5e-4 at
+# most, and a few of them make a place.
+FLOAT32_PIXELS = 2e-3

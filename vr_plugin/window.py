@@ -64,6 +64,11 @@ class Window:
         return self._glfw.get_window_pos(self.handle)
 
     @property
+    def content_scale(self) -> float:
+        """How large letters are to be, relative to a monitor of usual resolution: what the desktop says."""
+        return max(self._glfw.get_window_content_scale(self.handle))
+
+    @property
     def first_row(self) -> int:
         """The row of its monitor that its picture's top row lies on, for `stereo.shows_left`."""
         monitor = self._windows.monitors.below(self)

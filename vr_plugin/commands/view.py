@@ -7,6 +7,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
@@ -30,7 +31,11 @@ from persp_sw.commands.output import numbers, print_facts, print_json, progress_
 from ..rig import STEREO_MODES
 
 if TYPE_CHECKING:
+    from ..preview.controller import Preview
+    from ..preview.laid_over import LaidOver
+    from ..preview.pictures import PreviewPictures
     from ..preview.run import Run
+    from ..window import Window
 
 _EPILOG = """\b
 Examples:
@@ -45,7 +50,7 @@ moves. A --quality that is given without --target is held until 0 is pressed.
 \b
 H or F1 in the window lists all keys: drag to orbit, wheel to zoom, F to fly with
 W A S D, 1 to 8 for stereo, Tab for the room from outside, + and − to hold quality and 0 to
-let it go again, P for a picture on disk, Esc to leave.
+let it go again, F2 for the panel (transfer function, clipping, …), P for a picture on disk, Esc to leave.
 """
 _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 
@@ -64,6 +69,7 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
     "--rig", "rig_file", type=click.Path(), help="Room of the outside view; by default a four-wall CAVE."
 )
 @click.option("--outside", is_flag=True, help="Start with the room from outside.")
+@click.option("--panel", is_flag=True, help="Start with the panel, which F2 shows and hides.")
 @click.option(
     "--path", "recording", type=click.Path(), help="Recorded head path in the room, .csv or .csv.gz."
 )
@@ -102,6 +108,7 @@ def view(
     stereo: str,
     rig_file: str | None,
     outside: bool,
+    panel: bool,
     recording: str | None,
     warp: str,
     target_hz: float | None,
@@ -153,7 +160,7 @@ def view(
             held=held,
             progress=progress,
         )
-        press(preview, "TAB " * outside + (keys_pressed or ""))
+        press(preview, "TAB " * outside + "F2 " * panel + (keys_pressed or ""))
         with patience():
             first = pictures.composite(preview.advance(-FRAME_SECONDS))
         say_missing_voxels(chosen.volume)
@@ -168,12 +175,26 @@ def view(
         from ..preview.in_window import run_window
 
         with recording_to as recorder:
-            done = run_window(preview, pictures, frames=frames, recorder=recorder, **common)
+            done = run_window(
+                preview,
+                pictures,
+                frames=frames,
+                recorder=recorder,
+                open_panel=partial(open_panel, preview=preview, pictures=pictures),
+                **common,
+            )
     values = report(done, chosen.name, first.statistics)
     if as_json:
         print_json(values)
     else:
         _print(values)
+
+
+def open_panel(window: Window, preview: Preview, pictures: PreviewPictures) -> LaidOver:
+    """The panel over a window; MissingPackageError without its package, which nobody else needs."""
+    from ..panel.frontend import Panel
+
+    return Panel(window, preview, pictures)
 
 
 def check_display() -> None:

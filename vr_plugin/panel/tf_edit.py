@@ -133,6 +133,10 @@ class TransferEdit:
         if tuple(self.transfer.colours[index].tolist()) != tuple(colour):
             self._do(psw.editing.coloured(self.transfer, index, colour), ("colour", index, self._gestures))
 
+    def set_logarithmic(self, logarithmic: bool) -> None:
+        """Show opacities on a logarithmic axis, or on a linear one."""
+        self.axis = psw.editing.LOGARITHMIC if logarithmic else psw.editing.LINEAR
+
     def apply(self, transfer: psw.TransferFunction) -> None:
         """Another function altogether: a preset's, or a file's."""
         self.selected = None

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from ..rig import STEREO_MODES
 from ..stereo import Stereo, without_quad_buffers
+from .edits import Edits
 
 QUALITY_STEP = 2**0.5
 QUALITIES = (0.1, 8.0)
@@ -39,6 +40,10 @@ class Choices:
         Of the last picture; who draws says so.
     stereo, separation, quality, preset, overlay, help, volume_outside, message
         As in `Wanted`; `stereo` as chosen, whether the screen can show it or not.
+    panel
+        Whether the panel is shown, where there is a window.
+    edits
+        What has been edited; replaced by another whenever something is.
     quad_buffers
         Whether the screen can show quad-buffered stereo; where not, mono is wanted instead.
     screenshots
@@ -57,13 +62,19 @@ class Choices:
     ):
         self._presets = list(dict.fromkeys([preset, *presets]))
         self.preset, self.drawn_quality = preset, quality
-        self._free = None if follows else quality
+        self._fixed, self._free = quality, None if follows else quality
         self.quality = quality if held else self._free
         self.stereo, self.separation = Stereo(stereo), SEPARATION
         self.overlay, self.help, self.volume_outside = True, False, True
+        self.panel, self.edits = False, Edits()
         self.quad_buffers = False
         self.screenshots = 0
         self.message, self._message_seconds = "", 0.0
+
+    @property
+    def presets(self) -> list[str | None]:
+        """The names that preset keys go through; None: the scene's own transfer function."""
+        return list(self._presets)
 
     @property
     def possible_stereo(self) -> Stereo:
@@ -101,6 +112,10 @@ class Choices:
         """Show or hide the figures."""
         self.overlay = not self.overlay
 
+    def toggle_panel(self) -> None:
+        """Show or hide the panel."""
+        self.panel = not self.panel
+
     def screenshot(self) -> None:
         """Ask for a picture on disk."""
         self.screenshots += 1
@@ -130,6 +145,16 @@ class Choices:
         """Less depth."""
         self.separation = max(self.separation / SEPARATION_STEP, SEPARATIONS[0])
 
+    def hold_quality(self, quality: float | None) -> None:
+        """Pictures of this quality and no others; None: it follows the frame rate, if it can."""
+        self.quality = self._free if quality is None else float(min(max(quality, QUALITIES[0]), QUALITIES[1]))
+
+    def follow_rate(self, target_hz: float) -> None:
+        """Quality follows that frame rate from now on; 0: it is what it was at first."""
+        self.edits = replace(self.edits, target_hz=target_hz)
+        self._free = None if target_hz else self._fixed
+        self.release_quality()
+
     def better(self) -> None:
         """Finer pictures than the last, and no others."""
         self._hold(QUALITY_STEP)
@@ -144,11 +169,12 @@ class Choices:
 
     def _hold(self, factor: float) -> None:
         now = self.drawn_quality if self.quality is None else self.quality
-        self.quality = min(max(now * factor, QUALITIES[0]), QUALITIES[1])
+        self.hold_quality(now * factor)
 
     def _step_preset(self, step: int) -> None:
         place = self._presets.index(self.preset) + step
         self.preset = self._presets[place % len(self._presets)]
+        self.edits = replace(self.edits, transfer=None)
 
     def next_preset(self) -> None:
         """The transfer function that follows."""

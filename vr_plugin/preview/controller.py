@@ -94,6 +94,7 @@ class Preview:
         self._path_seconds, self._path_runs = 0.0, head_at is not None
         self._is_outside = False
         self._hand, self._now, self._changed = _Hand(), None, True
+        self._wanted: Wanted | None = None
         # An action is the preview's own or one of the choices'.
         self._actions: dict[str, Callable[[], None]] = {
             key: getattr(self, f"_{b.action}", None) or getattr(self.choices, b.action)
@@ -186,6 +187,15 @@ class Preview:
             moving = moving or self._is_outside
         moving |= self.choices.advance(seconds)
         self._changed = False
+        self._wanted = self._want(moving)
+        return self._wanted
+
+    @property
+    def wanted(self) -> Wanted:
+        """What `advance` gave last, with no time passed."""
+        return self._wanted or self._want(True)
+
+    def _want(self, moving: bool) -> Wanted:
         head, c = self._head_pose(), self.choices
         return Wanted(
             camera=self._camera.camera,
@@ -198,6 +208,7 @@ class Preview:
             head_eyes=None if head is None else eyes_of_head(head, self.rig.eyes),
             quality=c.quality,
             preset=c.preset,
+            edits=c.edits,
             overlay=c.overlay,
             help=c.help,
             volume_outside=c.volume_outside,

@@ -2,7 +2,8 @@
 
 While something moves, eye images are composited in turn with drawing, as well as the frame rate allows. At
 rest a thread refines them, so that hands are answered at once: the loop goes on looking for events, and what
-is under way is given up when something moves.
+is under way is given up when something moves. What the user edits in the panel is encoded and composited in a
+thread, too, always the newest edit, while the last picture and the panel stay in hand.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
 from ..record import FrameClock
 from ..screen.events import Button, Closing, Event, Focus, Key, Pointer, Resized, Wheel
 from ..window import Window, Windows
-from ..worker import Worker
+from .background import Background
 from .controller import Preview
 from .figures import Rate
+from .laid_over import Opener, PanelSlot
 from .pictures import Composited, PreviewPictures
 from .recorder import Recorder
 from .run import Run, Screenshots, texts
@@ -34,8 +35,7 @@ if TYPE_CHECKING:
 _FRAMES_FOR_A_RATE = 3
 _REST_SECONDS = 0.25  # how long nothing happens before we look again whether something did
 _REFINING_SECONDS = 0.01  # how long before we look again whether a better picture is finished
-# Longer than any encoding: two threads must not work with one renderer.
-_ENCODING_SECONDS = 600.0
+_EDITING_SECONDS = 0.002  # the same for the picture of an edit, which a hand waits for
 _log = logging.getLogger("persp_sw")
 
 
@@ -68,6 +68,7 @@ def run_window(
     turn: float = 0.0,
     warp: str = "auto",
     recorder: Recorder | None = None,
+    open_panel: Opener | None = None,
 ) -> Run:
     """Show the preview in a window until the user leaves, or for so many frames.
 
@@ -83,6 +84,8 @@ def run_window(
         "texture", "software", or "auto": the faster one, measured on the first frame.
     recorder
         Takes each frame.
+    open_panel
+        Makes the panel when it is first shown; None: there is none.
 
     Raises
     ------
@@ -106,7 +109,9 @@ def run_window(
             if missing := preview.choices.say_missing_quad_buffers():
                 _log.warning("%s", missing)
             shots = Screenshots(preview, pictures, folder, name)
-            loop = PreviewLoop(preview, pictures, screen, windows, window, shots, recorder or Recorder())
+            panel = PanelSlot(preview.choices, window, open_panel)
+            recorder = recorder or Recorder()
+            loop = PreviewLoop(preview, pictures, screen, windows, window, shots, recorder, panel)
             loop.choose_warp = warp == "auto"
             return loop.run(frames, turn)
         finally:
@@ -124,6 +129,8 @@ class PreviewLoop:
         Figures of each frame that was composited in turn.
     wait_s
         How long the next turn may wait for events.
+    background
+        What is made in a thread meanwhile.
     choose_warp
         Measure which warp is faster, once.
     """
@@ -137,17 +144,18 @@ class PreviewLoop:
         window: Window,
         shots: Screenshots,
         recorder: Recorder,
+        panel: PanelSlot | None = None,
     ):
         self.preview, self.pictures, self.screen = preview, pictures, screen
         self.windows, self.window = windows, window
         self.rows: list[dict[str, Any]] = []
         self.wait_s, self.choose_warp = 0.0, False
-        self._shots, self._recorder, self._rate = shots, recorder, Rate()
-        # Whoever asks what drawing takes has to wait for it: OpenGL draws while the program goes on.
-        self._timed = pictures.target_hz > 0 or recorder.is_on
+        self._shots, self._recorder = shots, recorder
+        self._panel = panel or PanelSlot(preview.choices, window, None)
+        self._rate = Rate()
         self._shown: Composited | None = None
         self._shown_for: tuple[object, ...] = ()  # `Wanted.eye_images`
-        self._refiner: Worker[Wanted, Composited] | None = None
+        self.background = Background(pictures)
         self._clock = FrameClock()
         self._kind: object = None
         self._failed: set[type] = set()
@@ -158,13 +166,18 @@ class PreviewLoop:
         """Until the user leaves, or for so many composited frames."""
         try:
             while not self.preview.finished and (frames is None or len(self.rows) < frames):
-                feed(self.preview, self.windows.poll(self.wait_s))
+                feed(self.preview, self._left_by_panel(self.windows.poll(self.wait_s)))
                 if self.rows and turn:
                     self.preview.orbit(turn)
                 self.turn(self.preview.advance(monotonic()), always=frames is not None)
         finally:
-            self._give_up_refining()
+            self.background.give_up()
+            self._panel.close()
         return Run(self.rows, self._shots.written)
+
+    def _left_by_panel(self, events: list[Event]) -> list[Event]:
+        panel = self._panel.shown
+        return events if panel is None else panel.take(events, self.preview.wanted)
 
     def turn(self, wanted: Wanted, always: bool = False) -> None:
         """Composite and show a frame, or refine the one shown, or do nothing and let the next turn wait.
@@ -178,7 +191,7 @@ class PreviewLoop:
         kind = (wanted.outside, wanted.stereo, wanted.quality, wanted.preset, wanted.size)
         try:
             if not self.window.is_drawn:
-                self._give_up_refining()
+                self.background.give_up()
                 self._pause(_REST_SECONDS)
                 return
             if kind != self._kind:
@@ -186,9 +199,12 @@ class PreviewLoop:
                 self._rate.clear()
             # A rate is known, and shown, after a few frames of one kind.
             rated = self._rate.count >= _FRAMES_FOR_A_RATE
-            if always or not rated or wanted.eye_images != self._shown_for:
+            edited = rated and not always and wanted.differs_by_edits_alone(self._shown_for)
+            if edited and self.preview.choices.panel:
+                self._edit(wanted)
+            elif always or not rated or wanted.eye_images != self._shown_for:
                 self._composite(wanted)
-            elif wanted.moving:  # texts
+            elif wanted.moving or self._panel.wants_frame:  # texts
                 self._show(wanted, self._shown, is_new=False)
             else:
                 self._refine(wanted)
@@ -200,7 +216,7 @@ class PreviewLoop:
             self._pause(_REST_SECONDS)
 
     def _composite(self, wanted: Wanted) -> None:
-        self._give_up_refining()
+        self.background.give_up()
         begin = monotonic()
         done = self.pictures.composite(wanted)
         figures = self._show(wanted, done, begin=begin)
@@ -208,38 +224,45 @@ class PreviewLoop:
         self._rate.add(seconds)
         self.rows.append({"ms": 1e3 * seconds, **figures})
 
+    def _edit(self, wanted: Wanted) -> None:
+        """Have the newest edit's picture made, show those that are finished, and the panel meanwhile."""
+        edited = self.background.edited(wanted)
+        if edited is not None and edited.done is not self._shown:
+            self._show(wanted, edited.done, of=edited.wanted)
+        elif wanted.moving or self._panel.wants_frame:
+            self._show(wanted, self._shown, is_new=False)
+        else:
+            self._pause(_EDITING_SECONDS)
+
     def _refine(self, wanted: Wanted) -> None:
         """Show a better picture where there is one, and have the next one made."""
-        if self._refiner is not None:
-            if self._refiner.is_busy:
-                self._pause(_REFINING_SECONDS)
-                return
-            done = self._refiner.newest()
-            if done is not None and done is not self._shown:
-                self._show(wanted, done)
-                return
-        if self.pictures.is_refined(wanted):
-            self._give_up_refining()
-            self._pause(_REST_SECONDS)
+        if self.background.is_refining:
+            self._pause(_REFINING_SECONDS)
             return
-        if self._refiner is None:
-            self._refiner = Worker(self._better, "refinement")
-        self._refiner.ask(wanted)
-        self._pause(_REFINING_SECONDS)
-
-    def _better(self, wanted: Wanted, cancel: psw.Cancel) -> Composited:
-        return self.pictures.composite(wanted, cancel, resting=True)
-
-    def _give_up_refining(self) -> None:
-        """At once, for compositing often looks whether it is cancelled; encoding is waited for."""
-        refiner, self._refiner = self._refiner, None
-        if refiner is not None:
-            refiner.close(_ENCODING_SECONDS)
+        better = self.background.refined()
+        if better is not None and better.done is not self._shown:
+            self._show(wanted, better.done)
+        elif self.pictures.is_refined(wanted):
+            self.background.give_up()
+            self._pause(_REST_SECONDS)
+        else:
+            self.background.refine(wanted)
+            self._pause(_REFINING_SECONDS)
 
     def _show(
-        self, wanted: Wanted, done: Composited, *, begin: float | None = None, is_new: bool = True
+        self,
+        wanted: Wanted,
+        done: Composited,
+        *,
+        begin: float | None = None,
+        is_new: bool = True,
+        of: Wanted | None = None,
     ) -> dict[str, Any]:
-        """Draw it; its figures. `begin`: of its compositing, if the display waited for that."""
+        """Draw it; its figures.
+
+        `begin`: of its compositing, if the display waited for that. `of`: what it was composited for, where
+        that is not what is wanted now.
+        """
         self.window.make_current()
         if self.choose_warp:
             self.screen.choose_warp(wanted, done)
@@ -248,7 +271,11 @@ class PreviewLoop:
         figures = self.screen.draw(
             wanted, done, lambda s: texts(wanted, s, self._rate), first_row=self.window.first_row
         )
-        if self._timed:
+        panel = self._panel.shown
+        if panel is not None:
+            panel.draw()
+        # Whoever asks what drawing takes has to wait for it: OpenGL draws while the program goes on.
+        if self.pictures.target_hz > 0 or self._recorder.is_on:
             self.screen.finish()
         drawn = monotonic()
         self.windows.swap()
@@ -261,7 +288,9 @@ class PreviewLoop:
         self._recorder.add(done, times, is_new=is_new)
         if is_new:
             self.pictures.drawn(wanted, done, upload_ms, warp_ms)  # a swap does nothing but wait
-        self._shown, self._shown_for = done, wanted.eye_images
+            self._shown, self._shown_for = done, (of or wanted).eye_images
+            if panel is not None:
+                panel.tell(figures, end - (start if begin is None else begin))
         self.preview.choices.drawn_quality = figures["quality"]
         if figures["encode_ms"]:
             self.window.set_title(self._title)

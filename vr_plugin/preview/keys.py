@@ -69,6 +69,7 @@ BINDINGS = (
     Binding((",",), ",", "preset before", "previous_preset"),
     Binding(("P",), "P", "write this picture as PNG", "screenshot"),
     Binding(("O",), "O", "figures on, off", "toggle_overlay"),
+    Binding(("F2",), "F2", "the panel: transfer function, clipping, …", "toggle_panel"),
     Binding(("H", "F1"), "H or F1", "this help", "toggle_help"),
     Binding(("ESCAPE",), "Esc", "leave the help, then the program", "quit"),
 )

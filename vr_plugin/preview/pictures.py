@@ -97,7 +97,8 @@ class PreviewPictures:
         self.background = np.asarray(background, np.float64)
         self.near = near
         self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
-        self._transfer_of, self._preset = transfer_of, preset
+        self._transfer_of, self._transfers = transfer_of, {preset: renderer.transfer}
+        self._preset, self._regions = preset, renderer.regions
         self._canvases: dict[str, psw.Canvas] = {}
         self._base = renderer.settings
         self._window = FrameMaker(renderer, (), np.eye(4))
@@ -107,11 +108,9 @@ class PreviewPictures:
             self._room = FrameMaker(renderer, walls, room_from_world)
             self._visitor = FrameMaker(renderer, (), room_from_world)
             self._makers.append(self._room)
-        self.target_hz = target_hz
         self._steadies: dict[FrameMaker, Steady] = {}
+        self._asked_hz = self._scene_hz = target_hz
         self._make_steady()
-        if self._steadies[self._window].controller is None:
-            self.target_hz = 0.0
 
     def composite(
         self, wanted: Wanted, cancel: psw.Cancel | None = None, resting: bool = False
@@ -138,6 +137,21 @@ class PreviewPictures:
         figures |= {"target_hz": self.target_hz, **_together(frame)}
         spent_ms = 1e3 * (perf_counter() - start) - made.cost.ms - made.cost.planning_ms
         return Composited(replace(frame, pictures=walls), visitor, figures, max(spent_ms, 0.0))
+
+    def transfer_of(self, preset: str | None) -> psw.TransferFunction:
+        """A preset's transfer function, always the same object; of None, the scene's own."""
+        if preset not in self._transfers:
+            self._transfers[preset] = self._transfer_of(preset)
+        return self._transfers[preset]
+
+    def is_known(self, preset: str | None) -> bool:
+        """Whether a preset's transfer function has been made."""
+        return preset in self._transfers
+
+    @property
+    def scene_regions(self) -> psw.Regions:
+        """Which part is shown where nothing was edited."""
+        return self._regions
 
     def drawn(self, wanted: Wanted, done: Composited, upload_ms: float = 0.0, warp_ms: float = 0.0) -> None:
         """What showing the eye images took, without the wait for the display: quality makes room for it."""
@@ -212,10 +226,18 @@ class PreviewPictures:
         return self._steadies[self._room if wanted.outside else self._window]
 
     def _set_up(self, wanted: Wanted) -> Steady:
-        if wanted.preset != self._preset:
-            self._preset = wanted.preset
-            self.renderer.transfer = self._transfer_of(wanted.preset)
-            self._make_steady()  # another function, another ladder
+        edits, renderer = wanted.edits, self.renderer
+        transfer = edits.transfer or self.transfer_of(wanted.preset)
+        if transfer is not renderer.transfer:
+            renderer.transfer = transfer
+        regions = edits.regions or self._regions
+        if regions is not renderer.regions:
+            renderer.regions = regions
+        target_hz = self._scene_hz if edits.target_hz is None else edits.target_hz
+        # Another function, another ladder; but not while a hand changes it.
+        if (wanted.preset, target_hz) != (self._preset, self._asked_hz):
+            self._preset, self._asked_hz = wanted.preset, target_hz
+            self._make_steady()
         steady = self._steady(wanted)
         steady.held = wanted.quality
         return steady
@@ -225,14 +247,16 @@ class PreviewPictures:
         aim = QualityAim() if self.rig is None else self.rig.quality
         # What the last ladder's rung changed is none of the user's choices.
         self.renderer.settings = replace(self._base, quality=self.renderer.settings.quality)
-        rate_hz, ladder = self.target_hz, None
+        rate_hz, ladder, steadies = self._asked_hz, None, {}
         for maker in self._makers:
             controller = controller_for(self.renderer, aim, rate_hz, ladder) if rate_hz else None
-            self._steadies[maker] = steady = Steady(maker, controller)
+            steadies[maker] = steady = Steady(maker, controller)
             steady.base = self._base
             if controller is not None:
                 ladder = controller.ladder
                 steady.refinement = psw.Refinement(ladder)
+        self._steadies = steadies  # at once: another thread may ask whether pictures are refined
+        self.target_hz = rate_hz if steadies[self._window].controller else 0.0
 
     def _moment(self, wanted: Wanted) -> Moment:
         mode = wanted.stereo.shown_mode

@@ -8,6 +8,7 @@ from ..cameras import Camera
 from ..eyes import EyePair
 from ..pose import Pose
 from ..stereo import Stereo
+from .edits import Edits
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class Wanted:
     quality, preset
         What the pictures should be like; quality None: what the frame rate allows, and at rest all that there
         is; preset None: the scene's own transfer function.
+    edits
+        What has been edited of the scene.
     overlay, help
         Which texts lie over the picture.
     volume_outside
@@ -55,6 +58,7 @@ class Wanted:
     head_eyes: EyePair | None
     quality: float | None
     preset: str | None
+    edits: Edits
     overlay: bool
     help: bool
     volume_outside: bool
@@ -69,4 +73,9 @@ class Wanted:
         """What eye images depend on: two moments of which it is equal differ in texts alone."""
         head = (*self.head.position.tolist(), *self.head.orientation.tolist()) if self.outside else ()
         inside = (self.camera, self.size, self.stereo, self.separation, self.quality, self.preset)
-        return (*inside, self.outside, self.volume_outside and self.outside, *head)
+        return (*inside, self.outside, self.volume_outside and self.outside, *head, self.edits)
+
+    def differs_by_edits_alone(self, eye_images: tuple[object, ...]) -> bool:
+        """Whether eye images are others than those, and nothing but edits is the reason."""
+        mine = self.eye_images
+        return mine != eye_images and mine[:-1] == eye_images[:-1]

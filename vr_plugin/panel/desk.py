@@ -1,0 +1,130 @@
+"""All that the panel's controls change, without the controls: each is a call that a program can make, too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import persp_sw as psw
+
+from .tf_edit import TransferEdit
+
+if TYPE_CHECKING:
+    from ..preview.choices import Choices
+    from ..preview.pictures import PreviewPictures
+
+
+class Desk:
+    """A preview under edit.
+
+    Parameters
+    ----------
+    choices
+        The preview's; what is edited here is `Choices.edits`, and keys may change them meanwhile.
+    pictures
+        For the scene's own regions, and presets' transfer functions.
+
+    Attributes
+    ----------
+    edit
+        The transfer function under the user's hand.
+    """
+
+    def __init__(self, choices: Choices, pictures: PreviewPictures):
+        self.choices, self._pictures = choices, pictures
+        self.volume: psw.Volume = pictures.renderer.volume
+        low, high = self.volume.value_range
+        self.edit = TransferEdit(self.transfer, (float(low), float(high)))
+
+    # --- the transfer function -----------------------------------------------------------------------------
+
+    @property
+    def transfer(self) -> psw.TransferFunction:
+        """As it is shown."""
+        return self.choices.edits.transfer or self._pictures.transfer_of(self.choices.preset)
+
+    def take_over(self) -> None:
+        """Let the editor know what keys have changed: another preset is a step that can be undone."""
+        if self.edit.transfer is not self.transfer:
+            self.edit.apply(self.transfer)
+
+    def hand_over(self) -> None:
+        """Show what the editor has."""
+        if self.edit.transfer is not self.transfer:
+            self.choices.edits = replace(self.choices.edits, transfer=self.edit.transfer)
+
+    @property
+    def preset(self) -> str:
+        """The name of the preset that is shown unchanged; "edited", or "the scene's own"."""
+        for name in self.choices.presets:
+            if self._pictures.is_known(name) and self.transfer is self._pictures.transfer_of(name):
+                return self.called(name)
+        return "edited"
+
+    @staticmethod
+    def called(preset: str | None) -> str:
+        """A preset for people."""
+        return "the scene's own" if preset is None else preset
+
+    def choose_preset(self, name: str | None) -> None:
+        """A preset's transfer function, as a step that can be undone."""
+        self.edit.apply(self._pictures.transfer_of(name))
+        self.hand_over()
+
+    @property
+    def target_hz(self) -> float:
+        """The frame rate that quality follows; 0: none."""
+        asked = self.choices.edits.target_hz
+        return self._pictures.target_hz if asked is None else asked
+
+    # --- regions -------------------------------------------------------------------------------------------
+
+    @property
+    def regions(self) -> psw.Regions:
+        """Which part is shown."""
+        return self.choices.edits.regions or self._pictures.scene_regions
+
+    def set_regions(self, regions: psw.Regions) -> None:
+        """Show another part; the same one is no edit."""
+        if regions != self.regions:
+            self.choices.edits = replace(self.choices.edits, regions=regions)
+
+    def reset_regions(self) -> None:
+        """The scene's own."""
+        self.choices.edits = replace(self.choices.edits, regions=None)
+
+    @property
+    def crop(self) -> tuple[float, ...]:
+        """x0, x1, y0, y1, z0, z1 in voxel index: the whole box where nothing is cropped."""
+        if self.regions.crop is not None:
+            return self.regions.crop
+        return tuple(end for count in self.volume.size for end in (0.0, count - 1.0))
+
+    def set_crop(self, side: int, value: float) -> None:
+        """One of the crop box's six sides, voxel index; no farther than the opposite side and the volume."""
+        crop, axis = list(self.crop), side // 2
+        low = crop[side - 1] if side % 2 else 0.0
+        high = self.volume.size[axis] - 1.0 if side % 2 else crop[side + 1]
+        crop[side] = float(np.clip(value, low, max(low, high)))
+        self.set_regions(replace(self.regions, crop=crop))
+
+    def add_clip(self, normal: Sequence[float]) -> int:
+        """A plane through the middle of the volume that hides what is against its normal; its number."""
+        normal = np.asarray(normal, np.float64) / np.linalg.norm(normal)
+        plane = (*normal.tolist(), -float(normal @ self.volume.centre))
+        self.set_regions(replace(self.regions, clip=(*self.regions.clip, plane)))
+        return len(self.regions.clip) - 1
+
+    def set_clip(self, number: int, plane: Sequence[float]) -> None:
+        """Another plane (nx, ny, nz, d) in the place of a clip plane."""
+        clip = list(self.regions.clip)
+        clip[number] = tuple(plane)
+        self.set_regions(replace(self.regions, clip=tuple(clip)))
+
+    def remove_clip(self, number: int) -> None:
+        """One clip plane less."""
+        clip = [plane for n, plane in enumerate(self.regions.clip) if n != number]
+        self.set_regions(replace(self.regions, clip=tuple(clip)))
