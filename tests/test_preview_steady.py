@@ -496,3 +496,101 @@ def test_the_command_follows_a_target_without_a_screen_only_if_asked(ball_file: 
 def test_a_rate_that_is_none_is_refused(ball_file: Path, tmp_path: Path, target: object):
     words = fails("view", ball_file, "--offscreen", "--target", target, "-o", tmp_path)
     assert "--target is 1 … 1000" in words
+
+
+# --- edits in the panel ------------------------------------------------------------------------------------
+
+
+def edit(m: Machine, opacity: float) -> psw.TransferFunction:
+    """Another function, as the panel makes one."""
+    choices = m.preview.choices
+    transfer = psw.editing.with_opacity(m.pictures.transfer_of(None), 1, opacity)
+    choices.edits = replace(choices.edits, transfer=transfer)
+    return transfer
+
+
+def test_edits_are_made_in_the_background_the_newest_next(machine: Callable[..., Machine]):
+    m = machine(quality=0.5)
+    m.preview.choices.panel = True
+    m.loop._panel._opener = lambda window: SimpleNamespace(
+        take=lambda events, wanted: events, tell=lambda *told: None, draw=lambda: None, wants_frame=True
+    )
+    m.turn(40)
+    composite, threads, made, free = m.pictures.composite, [], [], threading.Event()
+
+    def slow(wanted: Any, cancel: psw.Cancel | None = None, resting: bool = False) -> Any:
+        threads.append(threading.current_thread())
+        assert resting or free.wait(WAIT)
+        done = composite(wanted, cancel, resting)
+        if not resting:
+            made.append(wanted.edits.transfer)
+        return done
+
+    m.pictures.composite = slow
+    before = m.shown[-1][1]
+    functions = []
+    for opacity in (0.1, 0.2, 0.3):
+        functions.append(edit(m, opacity))
+        m.loop.turn(m.preview.advance(m.now))
+        while not threads:  # the first one is under way before the next comes
+            time.sleep(1e-3)
+    # The loop has answered each, with the picture from before.
+    assert [done is before for _, done in m.shown[-3:]] == [True] * 3
+    free.set()
+    m.turn(4)
+    assert made == [functions[0], functions[2]]
+    assert threading.main_thread() not in threads
+    renderer = psw.Renderer(m.pictures.renderer.volume, functions[2], m.pictures.renderer.settings)
+    (picture,) = m.shown[-1][1].inside.pictures
+    expected = renderer.render(picture.view)
+    np.testing.assert_array_equal(m.pictures.renderer.warp(picture.image, picture.view), expected)
+
+
+def test_a_hand_on_the_view_ends_the_background_s_work_and_shows_the_edit(machine: Callable[..., Machine]):
+    m = machine(quality=0.5)
+    m.preview.choices.panel = True
+    m.loop._panel._opener = lambda window: SimpleNamespace(
+        take=lambda events, wanted: events, tell=lambda *told: None, draw=lambda: None, wants_frame=False
+    )
+    m.turn(40)
+    transfer = edit(m, 0.3)
+    m.loop.turn(m.preview.advance(m.now))
+    assert not m.loop.background.is_idle
+    m.preview.orbit(0.1)
+    m.loop.turn(m.preview.advance(m.now))
+    assert m.loop.background.is_idle
+    assert m.pictures.renderer.transfer is transfer
+    assert m.shown[-1][0].edits.transfer is transfer
+
+
+def test_edits_of_regions_and_of_the_rate_reach_the_renderer_and_back(machine: Callable[..., Machine]):
+    m = machine(quality=0.5)
+    m.turn(5)
+    choices, renderer = m.preview.choices, m.pictures.renderer
+    own = renderer.regions
+    half = psw.Regions(clip=[(1.0, 0.0, 0.0, -24.0)])
+    choices.edits = replace(choices.edits, regions=half)
+    m.turn()
+    assert renderer.regions is half
+    choices.edits = replace(choices.edits, regions=None)
+    m.turn()
+    assert renderer.regions is own
+    choices.follow_rate(0.0)
+    m.turn()
+    assert m.last["target_hz"] == 0.0 and m.last["quality"] == 0.5
+    choices.follow_rate(2.0)
+    m.turn()
+    assert m.last["target_hz"] == 2.0 and choices.quality is None
+    choices.hold_quality(0.7)
+    m.turn()
+    assert m.last["quality"] == 0.7
+
+
+def test_another_preset_ends_an_edit(machine: Callable[..., Machine]):
+    m = machine(presets=("fog",))
+    m.turn(3)
+    edit(m, 0.3)
+    m.turn(3)
+    m.press(".")
+    assert m.preview.choices.edits.transfer is None
+    assert m.pictures.renderer.transfer is m.pictures.transfer_of("fog")

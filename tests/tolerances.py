@@ -280,3 +280,5 @@ STORED_OTHERWISE = 1e-3
 # Of a pixel: positions of widgets and pointers are float32 numbers below 4096, whose steps are 2.5e-4 at
 # most, and a few of them make a place.
 FLOAT32_PIXELS = 2e-3
+# A dot moved along its line is projected again: float64, magnified by lines seen nearly end on.
+HANDLE_PIXELS = 1e-6
