@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from .geometry.view import Eye, View, Wall
     from .measure.trace import FrameRecord, TraceWriter
     from .measure.trace_reading import read_trace
-    from .optics.joint_histogram import JointHistogram
     from .optics import editing
     from .optics.histogram import value_counts
+    from .optics.joint_histogram import JointHistogram
     from .optics.lighting import Light, Lighting
     from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
