@@ -49,7 +49,7 @@ VR_RANKS = {
     "eyes": 2, "placement": 2, "screen": 2,
     "cameras": 3, "rigs": 3, "trackers": 3, "present": 3, "window": 3, "host_view": 3,
     "depths": 3, "moment": 3, "pacing": 3,
-    "frame": 4, "formats": 4, "room": 4, "rest_watch": 4,
+    "frame": 4, "formats": 4, "room": 4, "rest_watch": 4, "film": 4,
     "host": 5, "steady": 5,
     "loop": 6,
     "shown": 7,
@@ -89,6 +89,7 @@ RESERVED = {
     "imgui_bundle": {
         f"vr_plugin.panel.{name}" for name in ("frontend", "sections", "tf_plot", "view_handles")
     },
+    "imageio_ffmpeg": {"vr_plugin.film.files"},
     # A host that is not ours, in the example of the plug-in only: nobody needs these packages to use it.
     "moderngl": {f"vr_plugin.examples.moderngl_{part}" for part in ("host", "scene")},
     "moderngl_window": {"vr_plugin.examples.moderngl_host"},

@@ -282,3 +282,22 @@ STORED_OTHERWISE = 1e-3
 FLOAT32_PIXELS = 2e-3
 # A dot moved along its line is projected again: float64, magnified by lines seen nearly end on.
 HANDLE_PIXELS = 1e-6
+# --- Flights and films -------------------------------------------------------------------------------------
+
+# Cubics of numbers up to 100 and a dozen products of unit quaternions, float64; a few 1e-15 of each …
+FLIGHT_TWIN = 1e-11
+# … and a quaternion from a matrix (an eigenvector), degrees from radians, a place from two others.
+FLIGHT_FILE = 1e-11
+
+# Steps of a 400th of the way are chords: where the way bends by an angle of up to 1 rad in one, shorter by
+# angle² / 24 = 4 %. The table of the way, with 256 lines from key to key, adds less than 1 %.
+FLIGHT_SPEED = 0.05
+
+# H.264 at constant rate factor 16 quantises with steps of 4 levels at most (QP 16), in the dead zone by up to
+# one step: 4 levels in a frame of nothing else, 20·log10(255 / 4) = 36 dB. Chroma of half the resolution
+# changes smooth pictures by less.
+FILM_DB = 36
+# A flat colour is its own mean: what is left is the rounding of Y, Cb and Cr to 8 bits (of 219 and 224
+# levels), 0.5 · (1.16 + 2.11) levels of blue at worst, and that of the step, 1. A matrix or a range mixed up
+# errs by over 8.
+FILM_FLAT = 3

@@ -39,7 +39,7 @@ tf_option = click.option(
     metavar="NAME|FILE",
     help="Transfer function: a preset or a saved one; chosen from the values by default.",
 )
-_VIEW_OPTIONS = [
+_CAMERA_OPTIONS = [
     tf_option,
     click.option("--size", type=int, nargs=2, metavar="W H", help="Picture size in pixels."),
     click.option("--eye", type=float, nargs=3, metavar="X Y Z", help="Where the eye stands, world."),
@@ -54,6 +54,9 @@ _VIEW_OPTIONS = [
         help="Parallel projection, H high in world.",
     ),
     click.option("--background", type=float, nargs=3, metavar="R G B", help="Linear colour behind, 0 … 1."),
+]
+_VIEW_OPTIONS = [
+    *_CAMERA_OPTIONS,
     click.option("--frames", type=int, metavar="N", help="Frames to time."),
 ]
 _REGION_OPTIONS = [
@@ -109,8 +112,13 @@ def volume_options(function: Function) -> Function:
     return _decorated(function, _VOLUME_OPTIONS)
 
 
-def view_options(function: Function) -> Function:
+def camera_options(function: Function) -> Function:
     """How it looks and from where; over the scene file's keys."""
+    return _decorated(function, _CAMERA_OPTIONS)
+
+
+def view_options(function: Function) -> Function:
+    """The same, and how often."""
     return _decorated(function, _VIEW_OPTIONS)
 
 
