@@ -255,18 +255,19 @@ def test_an_interrupted_process_leaves_nothing_and_says_so(ball_file: Path, tmp_
     folder.mkdir()
     command = [sys.executable, "-m", "persp_sw", "movie", ball_file, "-o", folder / "a.mp4"]
     process = subprocess.Popen(
-        [*map(str, command), "--frames", "900000", "--size", "64", "64"],
+        [*map(str, command), "--frames", "20000", "--size", "64", "64"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         cwd=ROOT,
+        start_new_session=True,
     )
     end = time.monotonic() + 100
     while not any(folder.iterdir()) and process.poll() is None and time.monotonic() < end:
         time.sleep(0.05)
     assert any(folder.iterdir()), process.communicate(timeout=30)
-    process.send_signal(signal.SIGINT)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     out, errors = process.communicate(timeout=60)
     assert (process.returncode, out, errors.strip()) == (130, "", "error: interrupted")
     assert not list(folder.iterdir())

@@ -65,7 +65,7 @@ class Flight:
         self._places = np.array(
             [[*c.position, np.log(c.distance), np.log(np.tan(c.fovy / 2))] for c in cameras]
         )
-        self._turns = _on_one_side([c.pose.orientation for c in cameras])
+        self._turns = [c.pose.orientation for c in cameras]
         intervals = np.diff(times)
         self._velocities = _velocities(np.diff(self._places, axis=0), intervals)
         arcs = [_log(multiply(a * _INVERSE, b)) for a, b in zip(self._turns, self._turns[1:], strict=False)]
@@ -120,14 +120,6 @@ class Flight:
         eyes = np.array([self.at(seconds).position for seconds in times])
         steps = np.linalg.norm(np.diff(eyes, axis=0), axis=-1)
         return times, np.append(0.0, np.cumsum(steps))
-
-
-def _on_one_side(turns: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The same turns by quaternions each of which is nearer to the one before than its negative is."""
-    aligned = [turns[0]]
-    for turn in turns[1:]:
-        aligned.append(turn if turn @ aligned[-1] >= 0 else -turn)
-    return aligned
 
 
 def _velocities(steps: np.ndarray, intervals: np.ndarray) -> np.ndarray:
