@@ -285,14 +285,21 @@ def _json(keys: Mapping[str, Any]) -> str:
 
 
 def _toml(keys: Mapping[str, Any]) -> str:
-    """The same in TOML."""
+    """The same in TOML; mappings are tables of their own, which TOML wants last."""
+    tables = {key: value for key, value in keys.items() if isinstance(value, Mapping)}
+    text = _toml_lines({key: value for key, value in keys.items() if key not in tables})
+    return text + "".join(f"\n[{key}]\n{_toml_lines(table)}" for key, table in tables.items())
+
+
+def _toml_lines(keys: Mapping[str, Any]) -> str:
     return "".join(f"{key} = {_toml_value(value)}\n" for key, value in keys.items() if value is not None)
 
 
 def _toml_value(value: Any) -> str:
     """Texts, numbers and booleans are written as JSON's; tables inline."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name} = {_toml_value(item)}" for name, item in value.items()) + "}"
+        pairs = (f"{name} = {_toml_value(item)}" for name, item in value.items() if item is not None)
+        return "{" + ", ".join(pairs) + "}"
     if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_toml_value, value)) + "]"
     return json.dumps(value, ensure_ascii=False)

@@ -68,6 +68,8 @@ class SceneKeys(BaseModel):
     eye_step: Vector3 | None = None
     step: Positive | None = None
     max_seconds: Positive | None = None
+    # Of sessions: stereo, held quality and so on of `persp-sw view`, which checks it; nothing else reads it.
+    view: dict[str, Any] = {}
 
     @field_validator("tf")
     @classmethod

@@ -42,6 +42,9 @@ Examples:
   persp-sw view head.nrrd
   persp-sw view scene.toml --stereo anaglyph
   persp-sw view head.nrrd --rig configs/cave4.toml --path walk.csv.gz --outside
+  persp-sw view head.nrrd --shot-size 7680 4320 --shot-samples 2
+  persp-sw view head-001.session.toml
+  persp-sw view scene.toml --fly flight.csv
   persp-sw view head.nrrd --offscreen --frames 36 --turn 10 -o pictures
 
 In a window quality follows the frame rate of --target, and goes up to the most while nothing
@@ -50,7 +53,8 @@ moves. A --quality that is given without --target is held until 0 is pressed.
 \b
 H or F1 in the window lists all keys: drag to orbit, wheel to zoom, F to fly with
 W A S D, 1 to 8 for stereo, Tab for the room from outside, + and − to hold quality and 0 to
-let it go again, F2 for the panel (transfer function, clipping, …), P for a picture on disk, Esc to leave.
+let it go again, F2 for the panel (transfer function, clipping, …), P for a picture on disk,
+F5 for a session file, F9 to record a flight and to end it, Esc to leave.
 """
 _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 
@@ -61,9 +65,7 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 @click.option(
     "--stereo",
     type=click.Choice(STEREO_MODES),
-    default="mono",
-    show_default=True,
-    help="Stereo mode to start with.",
+    help="Stereo mode to start with. [default: mono]",
 )
 @click.option(
     "--rig", "rig_file", type=click.Path(), help="Room of the outside view; by default a four-wall CAVE."
@@ -72,6 +74,30 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 @click.option("--panel", is_flag=True, help="Start with the panel, which F2 shows and hides.")
 @click.option(
     "--path", "recording", type=click.Path(), help="Recorded head path in the room, .csv or .csv.gz."
+)
+@click.option(
+    "--fly", "flight_file", type=click.Path(), help="Fly along a flight; see persp-sw movie --help."
+)
+@click.option(
+    "--shot-size",
+    type=click.IntRange(1, 16384),
+    nargs=2,
+    metavar="W H",
+    help="Size of the pictures that P writes, rendered anew. [default: the window's]",
+)
+@click.option(
+    "--shot-samples",
+    type=click.IntRange(1, 8),
+    default=1,
+    show_default=True,
+    help="Samples along each edge of such a picture's pixels.",
+)
+@click.option(
+    "--shot-format",
+    type=click.Choice(["png", "npy", "exr"]),
+    default="png",
+    show_default=True,
+    help="Of such a picture.",
 )
 @click.option(
     "--warp",
@@ -105,11 +131,15 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 def view(
     scene: str,
     size: tuple[int, int] | None,
-    stereo: str,
+    stereo: str | None,
     rig_file: str | None,
     outside: bool,
     panel: bool,
     recording: str | None,
+    flight_file: str | None,
+    shot_size: tuple[int, int] | None,
+    shot_samples: int,
+    shot_format: str,
     warp: str,
     target_hz: float | None,
     offscreen: bool,
@@ -132,6 +162,8 @@ def view(
     """
     import persp_sw as psw
 
+    from ..film.flight_file import load_flight
+    from ..preview.keepsakes import Keepsakes
     from ..preview.recorder import TARGET_HZ, recorder_to
     from ..preview.run import FRAME_SECONDS, run_offscreen
     from ..preview.session import PreviewError, open_preview, press
@@ -158,6 +190,7 @@ def view(
             presets=NAMES,
             target_hz=target_hz,
             held=held,
+            flight=load_flight(flight_file) if flight_file else None,
             progress=progress,
         )
         press(preview, "TAB " * outside + "F2 " * panel + (keys_pressed or ""))
@@ -165,7 +198,13 @@ def view(
             first = pictures.composite(preview.advance(-FRAME_SECONDS))
         say_missing_voxels(chosen.volume)
         recording_to = recorder_to(trace_file, scene, settings, pictures.target_hz, preview.rig.quality)
+        anew = shot_size or (preview.size if (shot_samples, shot_format) != (1, "png") else None)
+        kept = {"size": anew, "samples": shot_samples, "suffix": f".{shot_format}"}
+        keepsakes = Keepsakes(preview, pictures, folder, chosen.name, chosen, **kept)
+        if anew:
+            psw.images.check_output(folder / f"shot.{shot_format}")
         common = {"folder": folder, "name": chosen.name, "turn": np.radians(turn), "warp": warp}
+        common["keepsakes"] = keepsakes
         if offscreen:
             with recording_to as recorder:
                 done = run_offscreen(
@@ -183,6 +222,7 @@ def view(
                 open_panel=partial(open_panel, preview=preview, pictures=pictures),
                 **common,
             )
+    keepsakes.finish()
     values = report(done, chosen.name, first.statistics)
     if as_json:
         print_json(values)

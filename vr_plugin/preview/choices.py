@@ -46,8 +46,8 @@ class Choices:
         What has been edited; replaced by another whenever something is.
     quad_buffers
         Whether the screen can show quad-buffered stereo; where not, mono is wanted instead.
-    screenshots
-        How often a picture has been asked for.
+    screenshots, sessions
+        How often a picture, and a session file, has been asked for.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class Choices:
         self.overlay, self.help, self.volume_outside = True, False, True
         self.panel, self.edits = False, Edits()
         self.quad_buffers = False
-        self.screenshots = 0
+        self.screenshots = self.sessions = 0
         self.message, self._message_seconds = "", 0.0
 
     @property
@@ -119,6 +119,10 @@ class Choices:
     def screenshot(self) -> None:
         """Ask for a picture on disk."""
         self.screenshots += 1
+
+    def save_session(self) -> None:
+        """Ask for a session file."""
+        self.sessions += 1
 
     def set_stereo(self, mode: str) -> None:
         """Choose one of `STEREO_MODES`; swapped eyes stay so."""

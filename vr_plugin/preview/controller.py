@@ -14,9 +14,11 @@ import numpy as np
 
 from ..cameras import Camera
 from ..eyes import eyes_of_head
+from ..film.flight import Flight
 from ..pose import Pose, Vector
 from ..rig import STEREO_MODES, Rig
 from .choices import SEPARATION, Choices
+from .flights import Flights
 from .keys import BINDINGS, SPIN_KEYS, STEREO_KEYS, THRUST_KEYS
 from .navigation import STYLES, Navigator
 from .wanted import Wanted
@@ -56,11 +58,17 @@ class Preview:
         A recorded head: its pose in the room at so many seconds of the recording. None: keys move the head.
     choices
         Of stereo, quality and preset to start with.
+    flight
+        One that the camera follows at the start, until a hand takes it.
 
     Attributes
     ----------
     choices
         As keys have changed them since.
+    inside
+        The camera in the volume's world, in hand.
+    flights
+        That it follows, and that are recorded.
     size
         Of the window, pixels.
     finished
@@ -78,12 +86,14 @@ class Preview:
         outside_home: Camera | None = None,
         head_at: Callable[[float], Pose] | None = None,
         choices: Choices | None = None,
+        flight: Flight | None = None,
     ):
         self.rig = rig
         self.size = size
         self.choices = choices or Choices()
         self.finished = False
-        self._inside = Navigator(home, up, extent)
+        self.inside = self._inside = Navigator(home, up, extent)
+        self.flights = Flights(flight)
         self._outside = self._head = None
         if rig is not None:
             reach = float(np.ptp(rig.corners.reshape(-1, 3), axis=0).max())
@@ -182,6 +192,7 @@ class Preview:
         moving = self._changed or not all(hand.at_rest for hand in hands)
         for hand in hands:
             hand.advance(seconds)
+        moving |= self.flights.advance(seconds, self._inside)
         if self._path_runs:
             self._path_seconds += seconds
             moving = moving or self._is_outside
@@ -218,6 +229,11 @@ class Preview:
             moving=moving,
             path_runs=None if self._head_at is None else self._path_runs,
         )
+
+    @property
+    def is_outside(self) -> bool:
+        """Whether the room is shown from outside."""
+        return self._is_outside
 
     def _head_pose(self) -> Pose | None:
         if self._head is None:
@@ -271,4 +287,10 @@ class Preview:
         self._camera.style = "trackball" if self._camera.style == "turntable" else "turntable"
 
     def _pause_path(self) -> None:
-        self._path_runs = self._head_at is not None and not self._path_runs
+        if not self._is_outside:
+            self.flights.switch()
+        else:
+            self._path_runs = self._head_at is not None and not self._path_runs
+
+    def _record_flight(self) -> None:
+        self.choices.say(self.flights.record())

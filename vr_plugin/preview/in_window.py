@@ -69,6 +69,7 @@ def run_window(
     warp: str = "auto",
     recorder: Recorder | None = None,
     open_panel: Opener | None = None,
+    keepsakes: Screenshots | None = None,
 ) -> Run:
     """Show the preview in a window until the user leaves, or for so many frames.
 
@@ -86,6 +87,8 @@ def run_window(
         Takes each frame.
     open_panel
         Makes the panel when it is first shown; None: there is none.
+    keepsakes
+        Writes what the user asks for; None: pictures alone.
 
     Raises
     ------
@@ -108,7 +111,7 @@ def run_window(
             preview.choices.quad_buffers = screen.has_quad_buffers
             if missing := preview.choices.say_missing_quad_buffers():
                 _log.warning("%s", missing)
-            shots = Screenshots(preview, pictures, folder, name)
+            shots = keepsakes or Screenshots(preview, pictures, folder, name)
             panel = PanelSlot(preview.choices, window, open_panel)
             recorder = recorder or Recorder()
             loop = PreviewLoop(preview, pictures, screen, windows, window, shots, recorder, panel)
@@ -294,6 +297,8 @@ class PreviewLoop:
         self.preview.choices.drawn_quality = figures["quality"]
         if figures["encode_ms"]:
             self.window.set_title(self._title)
+        if self._shots.asked():  # two threads must not work with one renderer
+            self._give_up_refining()
         self._shots.write_if_asked(wanted, done)
         return figures
 

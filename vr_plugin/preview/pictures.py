@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
@@ -112,6 +113,17 @@ class PreviewPictures:
         self._asked_hz = self._scene_hz = target_hz
         self._make_steady()
 
+    def for_stills(self) -> PreviewPictures:
+        """Of the same renderer, but for pictures that take as long as they take, at the settings' quality.
+
+        One of the two at a time: it is one renderer.
+        """
+        stills = copy(self)
+        stills._asked_hz = stills._scene_hz = 0.0
+        stills._canvases, stills._steadies = {}, {}
+        stills._make_steady()
+        return stills
+
     def composite(
         self, wanted: Wanted, cancel: psw.Cancel | None = None, resting: bool = False
     ) -> Composited:
@@ -152,6 +164,10 @@ class PreviewPictures:
     def scene_regions(self) -> psw.Regions:
         """Which part is shown where nothing was edited."""
         return self._regions
+
+    def shows_preset(self, name: str | None) -> bool:
+        """Whether the renderer's transfer function is the one of this name, or was changed from it."""
+        return self._preset == name
 
     def drawn(self, wanted: Wanted, done: Composited, upload_ms: float = 0.0, warp_ms: float = 0.0) -> None:
         """What showing the eye images took, without the wait for the display: quality makes room for it."""

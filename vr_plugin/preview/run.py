@@ -104,6 +104,10 @@ class Screenshots:
         self._done = 0
         self.written: list[str] = []
 
+    def asked(self) -> bool:
+        """Whether a picture is to be rendered anew, for which nothing else may composite."""
+        return False
+
     def write_if_asked(self, wanted: Wanted, done: Composited) -> None:
         """Write what is shown now, if a picture has been asked for since the last time; and say so."""
         if self._preview.choices.screenshots == self._done:
@@ -133,6 +137,7 @@ def run_offscreen(
     turn: float = 0.0,
     warp: str = "auto",
     recorder: Recorder | None = None,
+    keepsakes: Screenshots | None = None,
     progress: Callable[[int, int, str], None] = lambda done, total, what: None,
 ) -> Run:
     """Draw so many frames, a sixtieth of a second apart, and write each as NAME-0000.png, …
@@ -145,21 +150,34 @@ def run_offscreen(
         "texture" (OpenGL, without a screen), "software", or "auto": the software warp, which needs nothing.
     recorder
         Takes each frame.
+    keepsakes
+        Writes what the user asks for; None: pictures alone.
     """
     recorder = recorder or Recorder()
     if missing := preview.choices.say_missing_quad_buffers():
         _log.warning("%s", missing)
+    shots = keepsakes or Screenshots(preview, pictures, folder, name)
     if warp == "texture":
         with psw.OffscreenContext():
             return _run_offscreen(
-                preview, pictures, _TextureFrames(pictures), frames, folder, name, turn, recorder, progress
+                preview,
+                pictures,
+                _TextureFrames(pictures),
+                frames,
+                folder,
+                name,
+                turn,
+                recorder,
+                shots,
+                progress,
             )
-    return _run_offscreen(preview, pictures, software_frame, frames, folder, name, turn, recorder, progress)
+    return _run_offscreen(
+        preview, pictures, software_frame, frames, folder, name, turn, recorder, shots, progress
+    )
 
 
-def _run_offscreen(preview, pictures, frame_of, frames, folder, name, turn, recorder, progress) -> Run:
+def _run_offscreen(preview, pictures, frame_of, frames, folder, name, turn, recorder, shots, progress) -> Run:
     rate, rows = Rate(), []
-    shots = Screenshots(preview, pictures, folder, name)
     for number in range(frames):
         progress(number, frames, "frames")
         if number:

@@ -10,7 +10,7 @@ import numpy as np
 import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
-from ..cameras import Camera
+from ..film.flight import Flight
 from ..formats.opening import open_rig
 from ..placement import corners_in_room, room_from_world
 from ..pose import Pose
@@ -21,6 +21,7 @@ from .choices import Choices
 from .controller import Preview
 from .keys import KEYS
 from .pictures import PreviewPictures
+from .saved_view import SavedView
 
 SIZE = (960, 720)
 TARGETS_HZ = (1.0, 1000.0)
@@ -36,20 +37,23 @@ def open_preview(
     settings: psw.Settings,
     *,
     size: tuple[int, int] | None = None,
-    stereo: str = "mono",
+    stereo: str | None = None,
     rig_file: str | Path | None = None,
     recording: str | Path | None = None,
     presets: tuple[str, ...] = (),
     target_hz: float = 0.0,
     held: bool = False,
+    flight: Flight | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[Preview, PreviewPictures]:
-    """A preview of a scene, and what makes its pictures.
+    """A preview of a scene, and what makes its pictures; that of a session as it was saved.
 
     Parameters
     ----------
     size
-        Of the window, pixels. None: 960 × 720.
+        Of the window, pixels. None: a session's, or 960 × 720.
+    stereo
+        Mode to start with. None: a session's, or mono.
     rig_file
         The room of the outside view, in any format that `open_rig` reads; None: `rooms.four_walls`.
     recording
@@ -59,14 +63,17 @@ def open_preview(
     target_hz
         The frame rate that quality follows, from that of the settings on; 0: none, it stays as set.
     held
-        It stays as set until the user lets it go.
+        It stays as set until the user lets it go; a session's that was held does so, too.
+    flight
+        One that the camera follows at the start.
 
     Raises
     ------
     PerspSWError
         Of any kind: whatever of these cannot be read or shown.
     """
-    size = size or SIZE
+    saved = SavedView.of_scene(scene)
+    size = size or (scene.size if saved.camera else SIZE)
     if not all(16 <= n <= 16384 for n in size):
         raise PreviewError(f"a window is 16 … 16384 pixels wide and high; given {size[0]} × {size[1]}")
     if target_hz and not TARGETS_HZ[0] <= target_hz <= TARGETS_HZ[1]:
@@ -101,16 +108,21 @@ def open_preview(
     pictures.progress = progress or pictures.progress
     follows = pictures.target_hz > 0
     corners = corners_in_room(np.eye(4), volume)  # in its own world
+    quality = settings.quality
+    if saved.quality is not None and not held:
+        quality, held = saved.quality, True
     preview = Preview(
-        Camera.of_view(view),
+        saved.camera_of(scene),
         up=scene.keys.up or UP,
         extent=float(np.ptp(corners, axis=0).max()) or 1.0,
         size=size,
         rig=rig,
         outside_home=room_camera(rig, size),
         head_at=head_at,
-        choices=Choices(presets, preset, settings.quality, stereo, follows=follows, held=held),
+        choices=Choices(presets, preset, quality, stereo or "mono", follows=follows, held=held),
+        flight=flight,
     )
+    saved.restore(preview, stereo=stereo is None)
     return preview, pictures
 
 
