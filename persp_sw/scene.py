@@ -21,6 +21,7 @@ from .optics import presets
 from .optics.look import Look
 from .optics.transfer import TransferFunction
 from .optics.transfer2d import TransferFunction2D
+from .volume.examples import example_name
 
 if TYPE_CHECKING:
     from .scene_schema import SceneKeys
@@ -255,8 +256,9 @@ class Scene:
     def _cross_check(self, keys: SceneKeys) -> list[str]:
         """What one key alone cannot tell: files that are not there, and views that are none."""
         problems = []
-        if self._volume is None and not self._path(keys.volume).exists():
-            problems.append(f"volume: there is no file or folder {self._path(keys.volume)}; check the path")
+        here = self._path(keys.volume)
+        if self._volume is None and not here.exists() and not example_name(here):
+            problems.append(f"volume: there is no file or folder {here}; check the path")
         if isinstance(keys.tf, str) and keys.tf not in presets.NAMES and not self._path(keys.tf).is_file():
             near = difflib.get_close_matches(keys.tf.lower(), presets.NAMES, 1, 0.5)
             advice = f"did you mean {near[0]}?" if near else f"the presets are {', '.join(presets.NAMES)}"

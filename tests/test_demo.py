@@ -16,8 +16,8 @@ from PIL import Image
 from samples import run
 
 import persp_sw as psw
-from persp_sw.commands import demo
 from persp_sw.errors import FileError, MissingPackageError
+from persp_sw.volume import examples
 from persp_sw.volume.ssdf import read_ssdf
 
 needs_visvis = pytest.mark.skipif(
@@ -81,7 +81,7 @@ def test_files_that_are_no_ssdf(tmp_path: Path, content, words):
 
 @needs_visvis
 def test_the_stent_is_read_without_importing_visvis():
-    volume = demo.stent()
+    volume = examples.stent()
     assert "visvis" not in sys.modules
     assert volume.size == (128, 128, 256)
     assert volume.data.dtype == np.int16
@@ -91,10 +91,26 @@ def test_the_stent_is_read_without_importing_visvis():
     assert np.abs(volume.data - same).max() <= 1
 
 
+@needs_visvis
+def test_the_scan_has_a_name_that_stands_for_a_file(tmp_path: Path, monkeypatch):
+    volume = examples.stent()
+    assert np.array_equal(psw.load("stent.demo").data, volume.data)
+    assert psw.load("stent.demo", spacing=(1, 2, 3)).spacing == (1, 2, 3)
+    scene = psw.Scene.of_file("stent.demo", tf="ct_bone")
+    assert scene.name == "stent"
+    (tmp_path / "sub").mkdir()
+    scene.save(tmp_path / "sub" / "scene.toml")
+    assert np.array_equal(psw.Scene.load(tmp_path / "sub" / "scene.toml").volume.data, volume.data)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "stent.demo").write_bytes(b"a file of that name is a file")
+    with pytest.raises(FileError, match="unknown kind of file"):
+        psw.load("stent.demo")
+
+
 def test_without_visvis_the_extra_is_named(monkeypatch, tmp_path: Path):
-    monkeypatch.setattr(demo.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr(examples.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(MissingPackageError):
-        demo.stent()
+        examples.stent()
     result = run("demo", "-o", tmp_path / "out")
     assert result.exit_code == 2
     assert "pip install 'persp-sw[demo]'" in result.stderr

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,13 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from .. import images
-from ..errors import FileError, MissingPackageError
 from ..geometry.framing import framed_view
 from ..geometry.regions import Regions
 from ..geometry.view import View
 from ..optics.presets import srgb_points
 from ..optics.transfer import TransferFunction
+from ..volume.examples import stent
 from ..volume.grid import Volume
-from ..volume.ssdf import read_ssdf
 from .options import json_option, open_scene
 from .output import console, print_json, progress_bars
 
@@ -113,29 +111,6 @@ def demo(
         print_json({"volume": volume.name, "folder": str(folder), "size": [size, size], "views": rows})
     else:
         _print(rows, folder, volume)
-
-
-def stent() -> Volume:
-    """The CT of a stent in an aorta that the package visvis brings along; visvis itself is not imported.
-
-    Raises
-    ------
-    MissingPackageError
-        visvis is not installed, or without the scan.
-    """
-    package = importlib.util.find_spec("visvis")
-    home = Path(package.origin).parent if package and package.origin else Path()
-    path = home / "visvisResources" / "stent_vol.ssdf"
-    if not path.is_file():
-        raise MissingPackageError(
-            "the demo's CT scan comes in the package visvis, which is not here: "
-            "pip install 'persp-sw[demo]', or show a volume of your own with --volume FILE"
-        )
-    content = read_ssdf(path)
-    levels, scale = content.get("vol"), content.get("colorscale")
-    if not isinstance(levels, np.ndarray) or not isinstance(scale, float):
-        raise FileError(f"{path} holds no scan (vol, colorscale); install visvis again")
-    return Volume(np.rint(levels * scale).astype(np.int16), name="stent in an aorta, CT")
 
 
 def demo_views(volume: Volume, size: int, *, close: bool) -> dict[str, View]:

@@ -12,6 +12,7 @@ from ..arrays import Vector
 from ..errors import FileError, VolumeError
 from . import dicom, metaimage, nifti, nrrd, raw, tiff, vtk_image
 from .dicom_series import Series, list_series
+from .examples import EXAMPLES, example_name
 from .grid import Volume
 from .orientation import letters
 from .stored import Progress, Stored, pick
@@ -50,7 +51,7 @@ def load(
     one file of a series), TIFF (a file of many pages, or a folder of single pages in natural order), .npy
     (axes z, y, x), VTK images (.vti, .vtk; with the extra `vtk`) and raw files. Values are as stored,
     after rescale slope and intercept. The pose is the file's, an anatomical one in LPS and mm; without one,
-    world = index · spacing.
+    world = index · spacing. "stent.demo", where there is no such file, is the scan of `persp-sw demo`.
 
     Parameters
     ----------
@@ -79,6 +80,9 @@ def load(
         A VTK file without the vtk package.
     """
     path = Path(path)
+    if example := example_name(path):
+        volume = EXAMPLES[example]()
+        return volume if spacing is None else volume.with_spacing(spacing)
     try:
         kind = _kind(path, shape is not None or dtype is not None)
         if series is not None and kind != "DICOM":
