@@ -130,12 +130,15 @@ def write(path: str | Path, image: ArrayLike, background: ArrayLike = (0, 0, 0))
     return path
 
 
-def write_rgb(path: str | Path, rgb: NDArray[np.uint8]) -> Path:
-    """Write (h, w, 3) uint8 sRGB as it is, as PNG. FileError where the disk refuses."""
+def write_rgb(path: str | Path, rgb: NDArray[np.uint8], *, optimize: bool = True) -> Path:
+    """Write (h, w, 3) uint8 sRGB as it is, as PNG. FileError where the disk refuses.
+
+    optimize: the smallest file, which takes some ten times as long; for single pictures.
+    """
     from PIL import Image
 
     try:
-        Image.fromarray(np.ascontiguousarray(rgb)).save(path, "PNG", optimize=True)
+        Image.fromarray(np.ascontiguousarray(rgb)).save(path, "PNG", optimize=optimize)
     except OSError as error:
         raise FileError(f"cannot write the picture {path}: {error.strerror or error}") from None
     return Path(path)

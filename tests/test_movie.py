@@ -108,6 +108,18 @@ def test_the_same_scene_gives_the_same_frames_whoever_asks(scene_file: Path, tmp
         assert np.array_equal(a, b)
 
 
+def test_settings_reach_the_renderer(scene_file: Path, tmp_path: Path):
+    options = ("--frames", 1, "--quality", 2, "--samples", 2, "--preintegrated")
+    result_of("movie", scene_file, "-o", tmp_path / "film", *options)
+    scene, _ = scene_and_renderer(scene_file)
+    settings = psw.Settings(quality=2, samples_per_interval=2, preintegrated=True)
+    renderer = psw.Renderer(scene.volume, scene.transfer, settings)
+    wanted = Shot(SIZE, background=scene.background).take(renderer, Camera.of_view(scene.view()))
+    (shown,) = pictures_of(tmp_path / "film")
+    assert np.array_equal(shown, wanted)
+    assert not np.array_equal(shown, Shot(SIZE).take(renderer, Camera.of_view(scene.view())))
+
+
 def test_a_flight_takes_its_seconds_and_passes_its_key_views(scene_file: Path, tmp_path: Path):
     path = flight_file(tmp_path)
     assert result_of("movie", scene_file, "-o", tmp_path / "film", "--path", path, "--fps", 2)["frames"] == 5

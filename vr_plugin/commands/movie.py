@@ -86,6 +86,11 @@ file; of pictures, those that are finished stay.
 @click.option(
     "--crf", type=int, metavar="N", help="What the film may lose, 0 … 51. [default: 16 (.webm 18): not seen]"
 )
+@click.option(
+    "--preintegrated/--point-samples",
+    default=None,
+    help="All values on a ray count, or only those at samples; by the transfer function where not said.",
+)
 @setting_options
 @camera_options
 @region_options
@@ -104,6 +109,7 @@ def movie(
     stereo: str,
     separation: float,
     crf: int | None,
+    preintegrated: bool | None,
     quality: float,
     samples: str | None,
     residual: float,
@@ -134,7 +140,7 @@ def movie(
         chosen = open_scene(scene, progress, **keys)
         path = out or f"{chosen.name}.mp4"
         file = film_file(path, chosen.size, fps, crf)
-        settings = settings_for(chosen, quality, samples, residual, threads)
+        settings = settings_for(chosen, quality, samples, residual, threads, preintegrated=preintegrated)
         if flight_file:
             flight = load_flight(flight_file)
             times = flight.times(frames or round(flight.duration * fps) + 1, constant_speed=constant_speed)

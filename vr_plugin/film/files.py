@@ -191,7 +191,7 @@ class _Pictures:
         path = self._folder / FRAME_NAME.format(self._count)
         part = path.with_suffix(".part")
         try:
-            psw.images.write_rgb(part, frame)
+            psw.images.write_rgb(part, frame, optimize=False)
             os.replace(part, path)
         finally:
             part.unlink(missing_ok=True)

@@ -15,6 +15,7 @@ from .pictures import PreviewPictures
 from .wanted import Wanted
 
 LARGEST = 16384  # pixels along an edge, samples counted
+_LARGE = 3 * 4096**2  # bytes of pixels, from which on the smallest file takes too long to find
 _ROWS = 256  # encoded at a time: eight bytes a channel in between
 
 
@@ -54,7 +55,7 @@ def screenshot(
     rgb = np.empty((*image.shape[:2], 3), np.uint8)
     for row in range(0, len(image), _ROWS):
         rgb[row : row + _ROWS] = psw.images.presented(image[row : row + _ROWS], pictures.background)
-    return psw.images.write_rgb(path, rgb)
+    return psw.images.write_rgb(path, rgb, optimize=rgb.size < _LARGE)
 
 
 def rendered(
