@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .optics.transfer import TransferFunction
     from .optics.transfer2d import Box, TransferFunction2D, Triangle
     from .planning import EyePlan
+    from .probe import Pick, Probe
     from .quality.controller import Choice, FrameTimeController
     from .quality.features import FrameCost, SceneFeatures
     from .quality.ladder import Ladder
@@ -63,6 +64,8 @@ __all__ = [
     "Modulation",
     "OffscreenContext",
     "PerspSWError",
+    "Pick",
+    "Probe",
     "Refinement",
     "Regions",
     "Renderer",
@@ -109,6 +112,8 @@ _HOME = {
     "Look": ".optics.look",
     "Modulation": ".optics.look",
     "OffscreenContext": ".warp.context",
+    "Pick": ".probe",
+    "Probe": ".probe",
     "PerspSWError": ".errors",
     "Refinement": ".quality.rest",
     "Regions": ".geometry.regions",

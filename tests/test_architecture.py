@@ -27,6 +27,7 @@ RANKS = {
     "persp_sw.geometry": 2,
     "persp_sw.eye_image": 3,
     "persp_sw.planning": 3,
+    "persp_sw.probe": 3,
     "persp_sw.sampling": 3,
     "persp_sw.slabs": 3,
     "persp_sw.compositor": 3,

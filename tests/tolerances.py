@@ -301,3 +301,20 @@ FILM_DB = 36
 # levels), 0.5 · (1.16 + 2.11) levels of blue at worst, and that of the step, 1. A matrix or a range mixed up
 # errs by over 8.
 FILM_FLAT = 3
+# --- Probes ------------------------------------------------------------------------------------------------
+
+# Some thousand float64 operations; sums over the table, up to 1e4 times a difference of two of them.
+PROBE_TWIN = 1e-11
+# The transfer function's table is of float32: 6e-8 of an extinction, of which 0.05 voxels are told.
+PROBE_TABLE = 6e-8 * 0.05
+# Waves of 2π/¼ voxels: over a step of one voxel the value leaves its chord by (¼)²/8 of its amplitude, which
+# is half of all there is, in colour and in extinction.
+PROBE_SMOOTH = 2 * 0.25**2 / 8 / 2
+# Where a step crosses an edge from nothing to all, its colours are mixed whichever comes first: they differ
+# by up to 0.8, and half of the square of its opacity, 0.16 in half a voxel, is mixed wrongly.
+PROBE_EDGES = 0.8 * 0.16**2 / 2
+# A step of half a voxel, in which hits are looked for in pieces of 1/16: where the value is linear an opaque
+# surface lies within such a piece.
+PROBE_SURFACE = 0.5 / 16
+# Pieces of 0.4 / 16 of noise of a few table entries; opacity before them, of pieces of 0.4, adds as much.
+PROBE_PIECES = 2 * 0.4 / 16
