@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from . import images, reference
+    from . import images, marks, reference
     from .cancel import Cancel, Cancelled
     from .errors import PerspSWError
     from .eye_image import EyeImage
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .optics.look import Look, Modulation
     from .optics.transfer import TransferFunction
     from .optics.transfer2d import Box, TransferFunction2D, Triangle
+    from .optics.window_level import CT_WINDOWS, window_level, window_of
     from .planning import EyePlan
     from .probe import Pick, Probe
     from .quality.controller import Choice, FrameTimeController
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Box",
+    "CT_WINDOWS",
     "Cancel",
     "Cancelled",
     "Canvas",
@@ -85,14 +87,18 @@ __all__ = [
     "images",
     "ladder_for",
     "load",
+    "marks",
     "read_trace",
     "reference",
     "value_counts",
+    "window_level",
+    "window_of",
 ]
 __version__ = "0.1.0"
 
 _HOME = {
     "Box": ".optics.transfer2d",
+    "CT_WINDOWS": ".optics.window_level",
     "Cancel": ".cancel",
     "Cancelled": ".cancel",
     "Canvas": ".warp.canvas",
@@ -133,6 +139,8 @@ _HOME = {
     "load": ".volume.files",
     "read_trace": ".measure.trace_reading",
     "value_counts": ".optics.histogram",
+    "window_level": ".optics.window_level",
+    "window_of": ".optics.window_level",
 }
 _MODULES = {"editing": ".optics.editing", "images": ".images", "reference": ".reference"}
 
@@ -140,6 +148,8 @@ _MODULES = {"editing": ".optics.editing", "images": ".images", "reference": ".re
 def __getattr__(name: str) -> object:
     if name in _MODULES:
         return import_module(_MODULES[name], __name__)
+    if name in ("images", "marks", "reference"):  # modules
+        return import_module(f".{name}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(_HOME[name], __name__), name)

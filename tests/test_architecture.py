@@ -26,6 +26,7 @@ RANKS = {
     "persp_sw.optics": 2,
     "persp_sw.geometry": 2,
     "persp_sw.eye_image": 3,
+    "persp_sw.marks": 3,
     "persp_sw.planning": 3,
     "persp_sw.probe": 3,
     "persp_sw.sampling": 3,

@@ -436,7 +436,7 @@ def test_text_shows_and_is_made_anew_only_when_it_changes():
 
 
 def test_text_is_light_on_a_dark_panel_in_columns(monkeypatch):
-    from vr_plugin.screen import lettering
+    from persp_sw.marks import lettering
     from vr_plugin.screen.lettering import INK, PANEL, text_panel
 
     for fonts in (lettering.FONTS, ()):  # those of the system, and what Pillow brings itself

@@ -318,3 +318,11 @@ PROBE_EDGES = 0.8 * 0.16**2 / 2
 PROBE_SURFACE = 0.5 / 16
 # Pieces of 0.4 / 16 of noise of a few table entries; opacity before them, of pieces of 0.4, adds as much.
 PROBE_PIECES = 2 * 0.4 / 16
+
+# --- Marks -------------------------------------------------------------------------------------------------
+
+# A handful of float32 operations on numbers up to 1, and the compositor's own CLOSED_FORM, twice.
+MARK_FLOAT32 = 6e-6
+# Pieces of 3 pixels of up to 0.6 voxels each, in fog of 0.36 a voxel: what is in front of their ends differs
+# by an exponent of 0.65, whose chord leaves the exponential by 0.65²/8 of it, of colours that differ by 0.8.
+MARK_INK = 0.65**2 / 8 * 0.8
