@@ -29,6 +29,7 @@ _OWN = {
         "persp_sw.commands.render:render",
         "Write a picture, its time and, if wanted, its measured error.",
     ),
+    "pick": ("persp_sw.commands.pick:pick", "Tell what is seen at a pixel: value, position, depth."),
     "demo": ("persp_sw.commands.demo:demo", "Show what it can do, on a real CT scan."),
     "bench": (
         "persp_sw.commands.bench:bench",

@@ -22,6 +22,7 @@ from .optics.look import Look
 from .optics.transfer import TransferFunction
 from .optics.transfer2d import TransferFunction2D
 from .volume.examples import example_name
+from .optics.window_level import window_level
 
 if TYPE_CHECKING:
     from .scene_schema import SceneKeys
@@ -135,7 +136,7 @@ class Scene:
     def preset(self) -> presets.Preset | None:
         """The preset that makes the transfer function, or None where the scene has one of its own."""
         tf = self.keys.tf
-        if self.keys.tf2d is not None:
+        if self.keys.tf2d is not None or self.keys.window is not None:
             return None
         if tf is None:
             return presets.choose(self.volume)
@@ -147,6 +148,8 @@ class Scene:
         tf, unit = self.keys.tf, self.keys.opacity_unit
         if self.keys.tf2d is not None:
             return TransferFunction2D.from_rows(self.keys.tf2d, unit or 1.0)
+        if self.keys.window is not None:
+            return window_level(*self.keys.window, opacity_unit=unit)
         if self.preset:
             transfer = self.preset.transfer
         elif isinstance(tf, str):

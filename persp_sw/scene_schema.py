@@ -44,6 +44,7 @@ class SceneKeys(BaseModel):
     # What of it is seen, and how.
     tf: Any = None  # rows, a preset's name or a file: checked below, with the transfer function's own words
     opacity_unit: Positive | None = None
+    window: tuple[Number, Positive] | None = None  # level and width of a grey ramp, instead of tf
     clip: list[tuple[Number, Number, Number, Number]] = []
     crop: tuple[Number, Number, Number, Number, Number, Number] | None = None
     crop_flags: Any = "subvolume"  # a name or a number; like `cut`, checked in the words of `Regions`

@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from ..errors import ViewError
 from ..optics.presets import NAMES
 from ..scene import Scene
 from ..volume.grid import Volume
 from .output import ProgressCall
 
 if TYPE_CHECKING:
+    from ..marks import MarkChoice
     from ..settings import Settings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -39,8 +41,27 @@ tf_option = click.option(
     metavar="NAME|FILE",
     help="Transfer function: a preset or a saved one; chosen from the values by default.",
 )
+window_option = click.option(
+    "--window",
+    type=float,
+    nargs=2,
+    metavar="LEVEL WIDTH",
+    help="Window and level: a grey ramp over these values, instead of a transfer function.",
+)
+_MARK_OPTIONS = [
+    click.option("--box", is_flag=True, help="Show the volume's bounding box."),
+    click.option("--axes", is_flag=True, help="Show its axes and, of a patient, the letters L R A P S I."),
+    click.option("--scale-bar", is_flag=True, help="Show a scale bar, as deep as the pivot."),
+    click.option("--legend", is_flag=True, help="Show the transfer function's colours and values."),
+    click.option("--cursor", type=float, nargs=3, metavar="X Y Z", help="Show a 3D cursor there, world."),
+    click.option("--planes", is_flag=True, help="The cursor with planes."),
+    click.option(
+        "--ruler", type=float, nargs=6, metavar="X Y Z X Y Z", help="Show the distance of two points, world."
+    ),
+]
 _CAMERA_OPTIONS = [
     tf_option,
+    window_option,
     click.option("--size", type=int, nargs=2, metavar="W H", help="Picture size in pixels."),
     click.option("--eye", type=float, nargs=3, metavar="X Y Z", help="Where the eye stands, world."),
     click.option("--centre", type=float, nargs=3, metavar="X Y Z", help="The point in the middle, world."),
@@ -130,6 +151,22 @@ def region_options(function: Function) -> Function:
 def setting_options(function: Function) -> Function:
     """Speed and accuracy."""
     return _decorated(function, _SETTING_OPTIONS)
+
+
+def mark_options(function: Function) -> Function:
+    """Marks in the picture; `marks_of` takes them."""
+    return _decorated(function, _MARK_OPTIONS)
+
+
+def marks_of(keys: dict[str, Any]) -> MarkChoice:
+    """The choice of `mark_options`, which are taken out of `keys`."""
+    from ..marks import MarkChoice
+
+    given = {name: keys.pop(name) for name in ("box", "axes", "scale_bar", "legend", "planes")}
+    cursor, ruler = keys.pop("cursor"), keys.pop("ruler")
+    if given["planes"] and not cursor:
+        raise ViewError("--planes are those of a cursor: say where, with --cursor X Y Z")
+    return MarkChoice(**given, cursor=cursor or None, ruler=(ruler[:3], ruler[3:]) if ruler else None)
 
 
 def json_option(function: Function) -> Function:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,8 @@ from ..optics.presets import NAMES, describe
 from ..scene import Scene
 from .options import (
     json_option,
+    mark_options,
+    marks_of,
     open_scene,
     region_options,
     say_missing_voxels,
@@ -23,6 +25,9 @@ from .options import (
 )
 from .output import byte_size, numbers, print_facts, print_json, progress_bars
 
+if TYPE_CHECKING:
+    from ..marks import MarkChoice
+
 _PRESETS = "\n".join(f"  {name:<11} {describe(name)}" for name in NAMES)
 _EPILOG = f"""\b
 Examples:
@@ -30,6 +35,8 @@ Examples:
   persp-sw render head.nrrd --preset ct_bone --eye 0 -600 200 --size 1024 768
   persp-sw render scene.toml --quality 2 --samples 2 --reference
   persp-sw render head.nrrd --clip 1 0 0 -90 --cut 0 0.2 1 -60 10 outside
+  persp-sw render head.nrrd --box --axes --scale-bar --cursor 12 -30 44 --legend
+  persp-sw render ct.nrrd --window 40 400
   persp-sw render scene.json --reference --json > result.json
 
 \b
@@ -66,6 +73,7 @@ comes before them. --quality and --samples change speed and error, never the loo
 @setting_options
 @view_options
 @region_options
+@mark_options
 @volume_options
 @json_option
 def render(
@@ -88,6 +96,7 @@ def render(
     SCENE is a scene file (.json, .toml) or any volume file; then everything else has a default. A .png shows
     the picture over the background, sRGB-encoded; .npy and .exr hold linear, premultiplied float32 RGBA.
     """
+    marks = marks_of(keys)
     with progress_bars() as progress:
         chosen = open_scene(scene, progress, **keys)
         path = images.check_output(out or f"{chosen.name}-render.png")
@@ -102,7 +111,7 @@ def render(
         )
         values = {
             "scene": scene,
-            **shoot(chosen, path, settings, tolerance if judge else None, progress, warp),
+            **shoot(chosen, path, settings, tolerance if judge else None, progress, warp, marks),
         }
     say_missing_voxels(chosen.volume)
     if as_json:
@@ -118,8 +127,13 @@ def shoot(
     tolerance: float | None,
     progress: Any,
     warp: str = "software",
+    marks: MarkChoice | None = None,
 ) -> dict[str, Any]:
-    """Render and time `scene`, write its picture to `path`; judge it where a `tolerance` is given."""
+    """Render and time `scene`, write its picture, with `marks` in it, to `path`.
+
+    Where a `tolerance` is given the picture without marks is judged, too.
+    """
+    from ..marks import with_marks
     from ..renderer import Renderer
     from .shots import MIN_FRAMES, Judgement, time_frames, write_judgement
     from .warps import WarpChoice
@@ -133,7 +147,10 @@ def shoot(
     with WarpChoice(renderer, warp, views[0].size) as drawn:
         timing = time_frames(drawn, views, scene.max_seconds)
     progress(len(views), len(views), "rendering")
-    images.write(path, timing.image, scene.background)
+    shown = timing.image
+    if marks:
+        shown = with_marks(shown, renderer, views[-1], marks, background=scene.background)
+    images.write(path, shown, scene.background)
     values = {
         "name": scene.name,
         "volume": str(scene.keys.volume),

@@ -4,12 +4,13 @@ What they are is data (`MarkChoice`, `Marks`); `veil` tells how an eye sees them
 lays them over a finished picture.
 """
 
-from .choice import MarkChoice
+from .choice import MarkChoice, legend_for, with_marks
 from .geometry import (
     axes,
     bounding_box,
     cursor,
     orientation_letters,
+    position_text,
     ruler,
     scale_bar,
     unit_of,
@@ -17,7 +18,7 @@ from .geometry import (
 from .legend import Legend, legend
 from .lettering import lettered
 from .numbers import length_text, round_length, short, ticks
-from .paint import label_picture, paint, painted
+from .paint import label_picture, lay_over, paint, painted
 from .shapes import Label, Line, Marks, Palette, Sheet
 from .veil import NEAREST, Veiled, VeiledLabel, VeiledLine, VeiledSheet, veil
 
@@ -38,12 +39,15 @@ __all__ = [
     "bounding_box",
     "cursor",
     "label_picture",
+    "lay_over",
     "legend",
+    "legend_for",
     "length_text",
     "lettered",
     "orientation_letters",
     "paint",
     "painted",
+    "position_text",
     "round_length",
     "ruler",
     "scale_bar",
@@ -51,4 +55,5 @@ __all__ = [
     "ticks",
     "unit_of",
     "veil",
+    "with_marks",
 ]

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import Vector
+from ..arrays import Image, Vector
 from ..geometry.view import View
+from ..optics.transfer import TransferFunction
+from ..probe import Probe
 from ..volume.grid import Volume
 from .geometry import (
     axes,
@@ -18,7 +21,15 @@ from .geometry import (
     scale_bar,
     unit_of,
 )
+from .legend import Legend, legend
+from .paint import lay_over, painted
 from .shapes import Marks, Palette
+
+if TYPE_CHECKING:
+    from ..renderer import Renderer
+
+_LEGEND = 0.42  # of the picture's height
+_LETTERS = (9, 13)  # heights of a legend's
 
 
 @dataclass(frozen=True)
@@ -73,3 +84,42 @@ class MarkChoice:
             middle = (np.asarray(wall.lower_right) + wall.upper_left) / 2
             marks += scale_bar(view, middle if pivot is None else pivot, unit_of(volume), palette)
         return marks
+
+
+def legend_for(
+    size: tuple[int, int], transfer: TransferFunction, volume: Volume, palette: Palette
+) -> tuple[Legend, tuple[int, int]]:
+    """The legend of a picture of (width, height) pixels, and where its upper left corner belongs in it."""
+    width, height = size
+    letter = int(np.clip(height // 40, *_LETTERS))
+    made = legend(transfer, volume.value_range, max(round(_LEGEND * height), 16), letter, palette)
+    return made, (width - made.picture.shape[1] - letter, height - made.picture.shape[0] - letter)
+
+
+def with_marks(
+    image: Image,
+    renderer: Renderer,
+    view: View,
+    choice: MarkChoice,
+    *,
+    background: Vector = (0.0, 0.0, 0.0),
+    pivot: Vector | None = None,
+) -> Image:
+    """A renderer's picture of a view with the marks of a choice in it.
+
+    Parameters
+    ----------
+    image
+        What `renderer.render(view)` gave; it is not changed.
+    background
+        (3,) linear, that it will lie over: marks are light over a dark one, dark over a light one.
+    pivot
+        World: as deep as the scale bar; None: the middle of the view's wall.
+    """
+    palette, volume = Palette.over(background), renderer.volume
+    marks = choice.of_view(volume, view, pivot, palette)
+    image = painted(image, view, marks, Probe.of(renderer))
+    if choice.legend:
+        made, (x, y) = legend_for(view.size, renderer.transfer, volume, palette)
+        lay_over(image, made.picture, x, y)
+    return image

@@ -10,7 +10,7 @@ from ..arrays import Points, Vector, vector
 from ..errors import ViewError
 from ..geometry.view import View
 from ..volume.grid import Volume
-from .numbers import length_text, round_length
+from .numbers import length_text, round_length, short
 from .shapes import Colour, Label, Line, Marks, Palette, Sheet
 
 _LIGHT = Palette.over()
@@ -25,6 +25,14 @@ _TICK = 0.008
 def unit_of(volume: Volume) -> str:
     """How lengths of a volume's world are called: a patient's are millimetres, others' are not known."""
     return "mm" if len(volume.orientation) == 3 else "units"
+
+
+def position_text(volume: Volume, point: Vector) -> str:
+    """A world position for people: a patient's by its directions, as "L 12.5 P 3 S 40.2 mm", else x, y, z."""
+    if len(volume.orientation) != 3:
+        return f"{' '.join(map(short, point))} {unit_of(volume)}"
+    letters = (pair[0 if at >= 0 else 1] for pair, at in zip(("LR", "PA", "SI"), point, strict=True))
+    return f"{' '.join(f'{a} {short(abs(at))}' for a, at in zip(letters, point, strict=True))} mm"
 
 
 def corners_of(volume: Volume) -> Points:

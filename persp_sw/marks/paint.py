@@ -67,6 +67,18 @@ def label_picture(label: Label) -> NDArray[np.float32]:
     return np.concatenate([rgb, (ink + rim)[..., None]], -1).astype(np.float32)
 
 
+def lay_over(picture: Image, panel: Image, x: int, y: int) -> None:
+    """Lay a picture over another, in place, its upper left corner at pixel (x, y); what sticks out is cut.
+
+    Both (h, w, 4) linear, premultiplied.
+    """
+    part = picture[max(y, 0) :, max(x, 0) :]
+    panel = panel[max(-y, 0) :, max(-x, 0) :][: part.shape[0], : part.shape[1]]
+    part = part[: panel.shape[0], : panel.shape[1]]
+    part *= 1 - panel[..., 3:]
+    part += panel
+
+
 def _lay(pixels: NDArray, tones: NDArray, opacity: NDArray) -> NDArray:
     """Colours (n, 3) over pixels (n, 4), each with its opacity (n,)."""
     over = np.column_stack([tones, np.ones(len(tones))]) * opacity[:, None]
@@ -165,10 +177,7 @@ def _paint_label(image: Image, view: View, shown: VeiledLabel, squeeze: tuple[in
     homogeneous = view.viewport_from_world @ (*label.point, 1.0)
     place = homogeneous[:2] / homogeneous[2] + np.array(label.shift) / squeeze
     x, y = np.rint(place - np.array(picture.shape[1::-1]) / 2).astype(int)
-    part = image[max(y, 0) : max(y + picture.shape[0], 0), max(x, 0) : max(x + picture.shape[1], 0)]
-    picture = picture[max(-y, 0) :, max(-x, 0) :][: part.shape[0], : part.shape[1]]
-    part *= 1 - picture[..., 3:]
-    part += picture
+    lay_over(image, picture, int(x), int(y))
 
 
 def veiled_picture(picture: NDArray[np.float32], veil: Points) -> NDArray[np.float32]:

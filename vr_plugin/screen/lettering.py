@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 import persp_sw as psw
 
-lettered = psw.marks.lettered
+lay_over, lettered = psw.marks.lay_over, psw.marks.lettered
 
 INK = (0.9, 0.93, 0.9)
 PANEL = (0.0, 0.0, 0.0, 0.85)  # of light: a bright picture behind it still shows as a dark grey
@@ -37,15 +37,3 @@ def squeezed(panel: NDArray[np.float32], across: int, down: int) -> NDArray[np.f
     height, width = (n // by * by for n, by in zip(panel.shape[:2], (down, across), strict=True))
     blocks = panel[:height, :width].reshape(height // down, down, width // across, across, 4)
     return blocks.mean((1, 3), dtype=np.float32)
-
-
-def lay_over(picture: NDArray[np.float32], panel: NDArray[np.float32], x: int, y: int) -> None:
-    """Lay a picture over another, in place, its upper left corner at pixel (x, y); what sticks out is cut.
-
-    Both (h, w, 4) linear, premultiplied.
-    """
-    part = picture[max(y, 0) :, max(x, 0) :]
-    panel = panel[max(-y, 0) :, max(-x, 0) :][: part.shape[0], : part.shape[1]]
-    part = part[: panel.shape[0], : panel.shape[1]]
-    part *= 1 - panel[..., 3:]
-    part += panel
