@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from .warp.texture import TextureWarp
 
 __all__ = [
-    "Box",
     "CT_WINDOWS",
+    "Box",
     "Cancel",
     "Cancelled",
     "Canvas",

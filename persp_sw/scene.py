@@ -21,8 +21,8 @@ from .optics import presets
 from .optics.look import Look
 from .optics.transfer import TransferFunction
 from .optics.transfer2d import TransferFunction2D
-from .volume.examples import example_name
 from .optics.window_level import window_level
+from .volume.examples import example_name
 
 if TYPE_CHECKING:
     from .scene_schema import SceneKeys

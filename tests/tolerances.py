@@ -326,3 +326,6 @@ MARK_FLOAT32 = 6e-6
 # Pieces of 3 pixels of up to 0.6 voxels each, in fog of 0.36 a voxel: what is in front of their ends differs
 # by an exponent of 0.65, whose chord leaves the exponential by 0.65²/8 of it, of colours that differ by 0.8.
 MARK_INK = 0.65**2 / 8 * 0.8
+# OpenGL beside the processor, sRGB 0 … 1: half floats, and lines' places in float32, which move the rim of a
+# line by some thousandths of a pixel, in linear light as much, of which the dark makes 12.9 times as much.
+MARK_OPENGL = 3 / 255

@@ -93,6 +93,16 @@ def eye_size(mode: str, size: Sequence[int]) -> tuple[int, int]:
     return place.width, place.height
 
 
+def in_eyes_picture(mode: str, size: Sequence[int], place: tuple[float, float]) -> tuple[float, float]:
+    """Where a place of a window (width, height) lies in the picture shown there, of the window's size.
+
+    Side by side and top–bottom show two, which the display stretches over all of itself.
+    """
+    across, down = (n / part for n, part in zip(size, eye_size(mode, size), strict=True))
+    x, y = place
+    return x * across % size[0] if across > 1 else x, y * down % size[1] if down > 1 else y
+
+
 def window_size(mode: str, eye_pixels: Sequence[int]) -> tuple[int, int]:
     """The smallest window that shows eyes' pictures of (width, height) pixels as they are."""
     _check(mode)

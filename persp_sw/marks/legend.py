@@ -77,6 +77,7 @@ def legend(
     left = margin + curve
     line_end = left + bar + margin
     size = height + 2 * (margin + letter // 2), line_end + words
+    size = tuple(n + n % 2 for n in size)  # it can be halved
     back = np.array([*palette.halo, 1.0]) * _BACK
     picture = np.empty((*size, 4))
     picture[:] = back

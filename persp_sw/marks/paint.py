@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ..probe import Probe
 
 _HALO = 0.8  # opacity of the rim around words
+_LEAST = 1e-6  # opacity: what rounding alone makes of nothing
 
 
 def painted(image: Image, view: View, marks: Marks, probe: Probe | None) -> Image:
@@ -58,8 +59,9 @@ def paint(image: Image, view: View, veiled: Veiled, squeeze: tuple[int, int] = (
 
 
 def label_picture(label: Label) -> NDArray[np.float32]:
-    """A word with its rim: (h, w, 4) float32, linear, premultiplied."""
-    ink = np.pad(lettered(label.text, label.letter), 1)
+    """A word with its rim: (h, w, 4) float32, linear, premultiplied; of even size, to be halved."""
+    ink = lettered(label.text, label.letter)
+    ink = np.pad(ink, [(1, 1 + n % 2) for n in ink.shape])
     rim = np.max([np.roll(ink, (m, n), (0, 1)) for m in (-1, 0, 1) for n in (-1, 0, 1)], 0)
     rim = (1 - ink) * rim * np.float32(_HALO)
     rgb = ink[..., None] * np.array(label.colour, np.float32)
@@ -114,7 +116,7 @@ def _paint_line(image: Image, view: View, line: VeiledLine) -> None:
     off = way @ (-along[1], along[0])
     cover = np.clip(line.width / 2 + 0.5 - np.abs(off), 0, 1) * line.opacity
     inside = (at[..., minor] > 0) & (at[..., minor] < size[minor])
-    drawn = (share >= 0) & (share < 1) & (cover > 0) & inside
+    drawn = (share >= 0) & (share < 1) & (cover > _LEAST) & inside
     column, row = (np.floor(at[drawn][:, n]).astype(int) for n in (0, 1))
     # Places on the line are perspective in pixels: of equal parts of it, farther ones look shorter.
     share = share[drawn] / end[2] / ((1 - share[drawn]) / start[2] + share[drawn] / end[2])
@@ -171,9 +173,8 @@ def _on_triangles(tones: Points, u: NDArray, v: NDArray) -> Points:
 def _paint_label(image: Image, view: View, shown: VeiledLabel, squeeze: tuple[int, int]) -> None:
     label, (across, down) = shown.label, squeeze
     picture = veiled_picture(label_picture(label), shown.veil)
-    height, width = (-(-n // by) * by for n, by in zip(picture.shape[:2], (down, across), strict=True))
-    picture = np.pad(picture, ((0, height - picture.shape[0]), (0, width - picture.shape[1]), (0, 0)))
-    picture = picture.reshape(height // down, down, width // across, across, 4).mean((1, 3))
+    height, width = (n // by for n, by in zip(picture.shape[:2], (down, across), strict=True))
+    picture = picture[: height * down, : width * across].reshape(height, down, width, across, 4).mean((1, 3))
     homogeneous = view.viewport_from_world @ (*label.point, 1.0)
     place = homogeneous[:2] / homogeneous[2] + np.array(label.shift) / squeeze
     x, y = np.rint(place - np.array(picture.shape[1::-1]) / 2).astype(int)

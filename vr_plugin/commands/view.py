@@ -18,6 +18,8 @@ from click.core import ParameterSource
 from persp_sw.commands.options import (
     NAMES,
     json_option,
+    mark_options,
+    marks_of,
     open_scene,
     region_options,
     say_missing_voxels,
@@ -25,6 +27,7 @@ from persp_sw.commands.options import (
     settings_for,
     tf_option,
     volume_options,
+    window_option,
 )
 from persp_sw.commands.output import numbers, print_facts, print_json, progress_bars
 
@@ -53,8 +56,9 @@ moves. A --quality that is given without --target is held until 0 is pressed.
 \b
 H or F1 in the window lists all keys: drag to orbit, wheel to zoom, F to fly with
 W A S D, 1 to 8 for stereo, Tab for the room from outside, + and − to hold quality and 0 to
-let it go again, F2 for the panel (transfer function, clipping, …), P for a picture on disk,
-F5 for a session file, F9 to record a flight and to end it, Esc to leave.
+let it go again, F2 for the panel (transfer function, clipping, …), I to pick what is under the
+pointer, B Y U L C for marks, P for a picture on disk, F5 for a session file, F9 to record a
+flight and to end it, Esc to leave.
 """
 _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 
@@ -124,8 +128,10 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 )
 @click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="Folder for pictures.")
 @tf_option
+@window_option
 @setting_options
 @region_options
+@mark_options
 @volume_options
 @json_option
 def view(
@@ -172,6 +178,7 @@ def view(
         check_display()
     if frames is not None and frames < 1:
         raise PreviewError(f"--frames is at least 1; given {frames}")
+    marks = marks_of(keys)
     folder = psw.images.output_folder(out)
     source = click.get_current_context().get_parameter_source("quality")
     held = target_hz is None and source is ParameterSource.COMMANDLINE
@@ -191,6 +198,7 @@ def view(
             target_hz=target_hz,
             held=held,
             flight=load_flight(flight_file) if flight_file else None,
+            marks=marks,
             progress=progress,
         )
         press(preview, "TAB " * outside + "F2 " * panel + (keys_pressed or ""))

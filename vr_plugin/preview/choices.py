@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import persp_sw as psw
+
 from ..rig import STEREO_MODES
 from ..stereo import Stereo, without_quad_buffers
 from .edits import Edits
@@ -69,12 +71,25 @@ class Choices:
         self.panel, self.edits = False, Edits()
         self.quad_buffers = False
         self.screenshots = self.sessions = 0
+        self._window: tuple[tuple[float, float], psw.TransferFunction] | None = None
         self.message, self._message_seconds = "", 0.0
 
     @property
     def presets(self) -> list[str | None]:
         """The names that preset keys go through; None: the scene's own transfer function."""
         return list(self._presets)
+
+    @property
+    def window(self) -> tuple[float, float] | None:
+        """Level and width of a grey ramp in place of the preset; None: another function is shown."""
+        if self._window is None or self.edits.transfer is not self._window[1]:
+            return None
+        return self._window[0]
+
+    @window.setter
+    def window(self, level_and_width: tuple[float, float]) -> None:
+        self._window = level_and_width, psw.window_level(*level_and_width)
+        self.edits = replace(self.edits, transfer=self._window[1])
 
     @property
     def possible_stereo(self) -> Stereo:

@@ -12,14 +12,18 @@ from functools import partial
 
 import numpy as np
 
+import persp_sw as psw
+
 from ..cameras import Camera
 from ..eyes import eyes_of_head
 from ..film.flight import Flight
 from ..pose import Pose, Vector
 from ..rig import STEREO_MODES, Rig
+from ..stereo import in_eyes_picture
 from .choices import SEPARATION, Choices
 from .flights import Flights
 from .keys import BINDINGS, SPIN_KEYS, STEREO_KEYS, THRUST_KEYS
+from .marking import Marking
 from .navigation import STYLES, Navigator
 from .wanted import Wanted
 
@@ -35,6 +39,7 @@ class _Hand:
     keys: set[str] = field(default_factory=set)
     button: str | None = None
     pointer: tuple[float, float] = (0.0, 0.0)
+    pressed_at: tuple[float, float] | None = None
     shift: bool = False
     control: bool = False
 
@@ -60,10 +65,12 @@ class Preview:
         Of stereo, quality and preset to start with.
     flight
         One that the camera follows at the start, until a hand takes it.
+    marking
+        Marks to start with, and what picks; None: none, and nothing can be picked.
 
     Attributes
     ----------
-    choices
+    choices, marking
         As keys have changed them since.
     inside
         The camera in the volume's world, in hand.
@@ -87,10 +94,12 @@ class Preview:
         head_at: Callable[[float], Pose] | None = None,
         choices: Choices | None = None,
         flight: Flight | None = None,
+        marking: Marking | None = None,
     ):
         self.rig = rig
         self.size = size
         self.choices = choices or Choices()
+        self.marking = marking or Marking()
         self.finished = False
         self.inside = self._inside = Navigator(home, up, extent)
         self.flights = Flights(flight)
@@ -105,9 +114,11 @@ class Preview:
         self._is_outside = False
         self._hand, self._now, self._changed = _Hand(), None, True
         self._wanted: Wanted | None = None
-        # An action is the preview's own or one of the choices'.
+        # An action is the preview's own, one of the choices' or one of the marks'.
         self._actions: dict[str, Callable[[], None]] = {
-            key: getattr(self, f"_{b.action}", None) or getattr(self.choices, b.action)
+            key: getattr(self, f"_{b.action}", None)
+            or getattr(self.choices, b.action, None)
+            or getattr(self.marking, b.action)
             for b in BINDINGS
             for key in b.keys
         }
@@ -134,7 +145,10 @@ class Preview:
         """A mouse button ("left", "middle", "right") goes down or up where the pointer is."""
         self._hand.shift, self._hand.control = shift, control
         if down:
-            self._hand.button = name
+            self._hand.button, self._hand.pressed_at = name, self._hand.pointer
+        elif self._hand.button == name and control and self._hand.pressed_at == self._hand.pointer:
+            self._hand.button = None
+            self._pick()
         elif self._hand.button == name:
             self._hand.button = None
 
@@ -146,6 +160,8 @@ class Preview:
         right, down = (x - was_x) / self.size[1], (y - was_y) / self.size[1]
         if self._head is not None and self._is_outside and self._hand.control:
             self._head.turn(right, down)
+        elif self._hand.control and not self._is_outside:
+            self._turn_window(right, down)
         elif self._hand.button != "left" or self._hand.shift:
             self._camera.pan(right, down)
         else:
@@ -228,6 +244,9 @@ class Preview:
             message=c.message,
             moving=moving,
             path_runs=None if self._head_at is None else self._path_runs,
+            marks=self.marking.choice,
+            picked=self.marking.picked,
+            window=c.window,
         )
 
     @property
@@ -285,6 +304,20 @@ class Preview:
 
     def _turntable_or_trackball(self) -> None:
         self._camera.style = "trackball" if self._camera.style == "turntable" else "turntable"
+
+    def _pick(self) -> None:
+        if self._is_outside:
+            self.say("picks are made inside: press Tab")
+            return
+        # Both eyes' pictures lie one over the other, or side by side: what is between the eyes is picked.
+        x, y = in_eyes_picture(self.choices.possible_stereo.shown_mode, self.size, self._hand.pointer)
+        camera = self._camera.camera
+        view = psw.View.through_wall(camera.position, camera.wall(self.size))
+        self.say(self.marking.pick(view, (x, y)))
+
+    def _turn_window(self, rightwards: float, downwards: float) -> None:
+        self.choices.window = self.marking.window_after(self.choices.window, rightwards, -downwards)
+        self.say("level {}, width {}".format(*map(psw.marks.short, self.choices.window)))
 
     def _pause_path(self) -> None:
         if not self._is_outside:

@@ -24,6 +24,7 @@ from ..room import outside
 from ..room.painter import RoomPainter, encoded
 from ..steady import Steady
 from ..stereo import combine, eye_size
+from .marked import PictureMarks
 from .wanted import Wanted
 
 WALL_PIXELS = 384  # of a wall's longer side in the view from outside
@@ -79,6 +80,8 @@ class PreviewPictures:
         0 also where the limits leave nothing to choose.
     progress
         Called with (done, total, what) while the volume is encoded.
+    marks
+        What the pictures show of marks.
     """
 
     def __init__(
@@ -100,6 +103,7 @@ class PreviewPictures:
         self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
         self._transfer_of, self._transfers = transfer_of, {preset: renderer.transfer}
         self._preset, self._regions = preset, renderer.regions
+        self.marks = PictureMarks(renderer, psw.marks.Palette.over(self.background))
         self._canvases: dict[str, psw.Canvas] = {}
         self._base = renderer.settings
         self._window = FrameMaker(renderer, (), np.eye(4))
@@ -188,7 +192,10 @@ class PreviewPictures:
             picture = self.draw_room(wanted, done)
             pictures = dict.fromkeys(("left", "middle", "right"), picture)
         else:
-            pictures = {p.eye: self.warp(p.eye, p.image, p.view) for p in done.inside.pictures}
+            pictures = {
+                p.eye: self.marks.painted(self.warp(p.eye, p.image, p.view), wanted, p)
+                for p in done.inside.pictures
+            }
         return pictures, 1e3 * (perf_counter() - start)
 
     def draw_room(self, wanted: Wanted, done: Composited) -> NDArray[np.float32]:
@@ -224,7 +231,10 @@ class PreviewPictures:
         """What a wall's window shows, (h, w, 3) sRGB."""
         mode = wanted.stereo.shown_mode
         own = {p.eye: p for p in done.inside.pictures if p.wall.name == name}
-        drawn = {eye: self.warp(f"{name} {eye}", p.image, p.view) for eye, p in own.items()}
+        drawn = {
+            eye: self.marks.painted(self.warp(f"{name} {eye}", p.image, p.view), wanted, p)
+            for eye, p in own.items()
+        }
         if len(drawn) == 1:
             (only,) = drawn.values()
             return encoded(only[..., :3] + (1 - only[..., 3:]) * self.background)

@@ -19,6 +19,7 @@ from ..screen.gl_objects import Texture
 from ..screen.lettering import lettered
 from ..screen.shapes import Shapes, clip_from_pixels
 from ..screen.text_overlay import Overlay
+from .mark_shapes import MarkShapes
 from .pictures import Composited, PreviewPictures
 from .wanted import Wanted
 
@@ -47,6 +48,7 @@ class PreviewScreen:
         self.pictures, self.warp = pictures, warp
         self._texture = psw.TextureWarp()
         self._composer, self._shapes = Composer(), Shapes()
+        self._marks = MarkShapes(self._shapes)
         self._targets: dict[str, EyeTarget] = {}
         self._overlays: dict[str, Overlay] = {}
         self._labels: dict[tuple[str, Colour], Texture] = {}
@@ -88,7 +90,7 @@ class PreviewScreen:
             target = self._draw_room(wanted, done)
             shown, mode = {"left": target, "middle": target, "right": target}, "mono"
         else:
-            shown, mode = self._draw_eyes(done.inside.pictures, "window"), wanted.stereo.shown_mode
+            shown, mode = self._draw_eyes(wanted, done.inside.pictures, "window"), wanted.stereo.shown_mode
         warp_ms = 1e3 * (perf_counter() - start) - self._upload_ms
         times = {"upload_ms": self._upload_ms, "warp_ms": warp_ms, "warp": self.warp}
         figures = {**done.statistics, **times}
@@ -129,27 +131,38 @@ class PreviewScreen:
         """Delete all that it made."""
         for part in (*self._targets.values(), *self._overlays.values(), *self._labels.values()):
             part.close()
-        for part in (self._texture, self._composer, self._shapes):
+        for part in (self._texture, self._composer, self._marks, self._shapes):
             part.close()
 
-    def _draw_eyes(self, pictures: Sequence[Picture], name: str) -> dict[str, EyeTarget]:
-        """Targets by the eyes' names, each with its eye's picture of one wall."""
+    def _draw_eyes(self, wanted: Wanted, pictures: Sequence[Picture], name: str) -> dict[str, EyeTarget]:
+        """Targets by the eyes' names, each with its eye's picture of one wall, marks and all."""
         targets = {}
         for picture in pictures:
             target = targets[picture.eye] = self._target(f"{name} {picture.eye}", picture.view.size)
             if self.warp == "software":
                 target.upload(self.pictures.warp(f"{name} {picture.eye}", picture.image, picture.view))
-                continue
-            self._upload(picture)
-            with target.drawing():
-                self._texture.draw_view(picture.view, picture.eye)
+            else:
+                self._upload(picture)
+                with target.drawing():
+                    self._texture.draw_view(picture.view, picture.eye)
+            self._draw_marks(wanted, picture, target)
         return targets
+
+    def _draw_marks(self, wanted: Wanted, picture: Picture, target: EyeTarget) -> None:
+        veiled = self.pictures.marks.veiled(wanted, picture)
+        if veiled is None:
+            return
+        with target.drawing(clear=False):
+            size = picture.view.size if wanted.outside else wanted.size
+            self._marks.draw(veiled, picture.view, size)
+            if (made := self.pictures.marks.legend(wanted)) is not None:
+                self._marks.draw_legend(*made, picture.view, wanted.size)
 
     def _draw_room(self, wanted: Wanted, done: Composited) -> EyeTarget:
         walls = {}
         for name in dict.fromkeys(picture.wall.name for picture in done.inside.pictures):
             own = [picture for picture in done.inside.pictures if picture.wall.name == name]
-            eyes = self._draw_eyes(own, f"wall {name}")
+            eyes = self._draw_eyes(wanted, own, f"wall {name}")
             mode = wanted.stereo.shown_mode if len(eyes) == 2 else "mono"
             (left, right) = (
                 (eyes[c] for c in wanted.stereo.channels) if len(eyes) == 2 else 2 * [*eyes.values()]

@@ -20,6 +20,7 @@ from ..room.rooms import four_walls
 from .choices import Choices
 from .controller import Preview
 from .keys import KEYS
+from .marking import Marking
 from .pictures import PreviewPictures
 from .saved_view import SavedView
 
@@ -44,6 +45,7 @@ def open_preview(
     target_hz: float = 0.0,
     held: bool = False,
     flight: Flight | None = None,
+    marks: psw.marks.MarkChoice | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> tuple[Preview, PreviewPictures]:
     """A preview of a scene, and what makes its pictures; that of a session as it was saved.
@@ -66,6 +68,8 @@ def open_preview(
         It stays as set until the user lets it go; a session's that was held does so, too.
     flight
         One that the camera follows at the start.
+    marks
+        To start with.
 
     Raises
     ------
@@ -121,6 +125,7 @@ def open_preview(
         head_at=head_at,
         choices=Choices(presets, preset, quality, stereo or "mono", follows=follows, held=held),
         flight=flight,
+        marking=Marking(marks, volume, lambda: psw.Probe.of(renderer), lambda: renderer.transfer),
     )
     saved.restore(preview, stereo=stereo is None)
     return preview, pictures

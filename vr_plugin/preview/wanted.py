@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import persp_sw as psw
+
 from ..cameras import Camera
 from ..eyes import EyePair
 from ..pose import Pose
@@ -46,6 +48,12 @@ class Wanted:
         Whether this differs from what was wanted before, or the next moment will.
     path_runs
         Whether the recorded head moves; None without a recording.
+    marks
+        Box, axes, cursor and so on.
+    picked
+        What was picked last, for people; "" if nothing.
+    window
+        Level and width of a grey ramp instead of the preset's transfer function; None: that.
     """
 
     camera: Camera
@@ -67,6 +75,9 @@ class Wanted:
     message: str
     moving: bool
     path_runs: bool | None
+    marks: psw.marks.MarkChoice
+    picked: str
+    window: tuple[float, float] | None
 
     @property
     def eye_images(self) -> tuple[object, ...]:

@@ -12,26 +12,32 @@ from numpy.typing import ArrayLike
 from OpenGL import GL
 
 from .gl_objects import Program, integers, kept_state
+from .ribbons import CORNERS, clipped, ribbons
 
 _VERTEX = """
 layout(location = 0) in vec4 clip;
-layout(location = 1) in vec2 place;  // in the picture, 0 … 1; of a line: x is the pixels from its middle
+layout(location = 1) in vec2 place;  // in the picture, 0 … 1; of a line: pixels from its middle, half width
+layout(location = 2) in vec4 shade;  // premultiplied, of what has a colour for each corner
 out vec2 at;
+out vec4 tone;
 noperspective out float off;
 void main() {
     gl_Position = clip;
     at = place;
+    tone = shade;
     off = place.x;
 }
 """
 
 _FRAGMENT = """
-uniform int kind;  // 0: flat, 1: line, 2: picture
+uniform int kind;  // 0: flat, 1: line, 2: picture; 3: flat, 4: line, both with a colour for each corner
 uniform vec4 tint;  // premultiplied; behind a picture
 uniform float half_width;
 uniform float opacity;
+uniform vec4 veil;  // what a picture is seen through: premultiplied colour, transparency
 uniform sampler2D picture;
 in vec2 at;
+in vec4 tone;
 noperspective in float off;
 out vec4 colour;
 void main() {
@@ -39,12 +45,16 @@ void main() {
     if (kind == 1) colour *= clamp(half_width + 0.5 - abs(off), 0, 1);
     if (kind == 2) {
         vec4 shown = texture(picture, at);
+        shown.rgb = shown.rgb * veil.a + shown.a * veil.rgb;
         colour = (shown + (1 - shown.a) * tint) * opacity;
     }
+    if (kind >= 3) colour = tone;
+    if (kind == 4) colour *= clamp(at.y + 0.5 - abs(off), 0, 1);
     if (colour.a <= 0) discard;  // or it would hide by its depth what lies behind
 }
 """
-_FLAT, _LINE, _PICTURE = 0, 1, 2
+_FLAT, _LINE, _PICTURE, _SHADED, _BAND = range(5)
+_CLEAR = (0.0, 0.0, 0.0, 1.0)  # nothing that a picture is seen through
 
 
 def clip_from_pixels(size: Sequence[int]) -> np.ndarray:
@@ -64,7 +74,8 @@ class Shapes:
 
     def __init__(self):
         self._program = Program(_VERTEX, _FRAGMENT)
-        self._vertices, self._buffer = int(GL.glGenVertexArrays(1)), int(GL.glGenBuffers(1))
+        self._vertices, self._shaded = (int(name) for name in GL.glGenVertexArrays(2))
+        self._buffer = int(GL.glGenBuffers(1))
         self._sampler = int(GL.glGenSamplers(1))
         self._mipmapped = int(GL.glGenSamplers(1))
         for sampler, minified in (
@@ -79,11 +90,13 @@ class Shapes:
             ):
                 GL.glSamplerParameteri(sampler, name, value)
         with kept_state():
-            GL.glBindVertexArray(self._vertices)
             GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffer)
-            for location, count, start in ((0, 4, 0), (1, 2, 16)):
-                GL.glEnableVertexAttribArray(location)
-                GL.glVertexAttribPointer(location, count, GL.GL_FLOAT, False, 24, GL.GLvoidp(start))
+            parts = ((0, 4, 0), (1, 2, 16), (2, 4, 24))
+            for vertices, size, has in ((self._vertices, 24, parts[:2]), (self._shaded, 40, parts)):
+                GL.glBindVertexArray(vertices)
+                for location, count, start in has:
+                    GL.glEnableVertexAttribArray(location)
+                    GL.glVertexAttribPointer(location, count, GL.GL_FLOAT, False, size, GL.GLvoidp(start))
 
     def lines(
         self,
@@ -109,8 +122,41 @@ class Shapes:
         viewport = integers(GL.GL_VIEWPORT, 4)
         if min(viewport[2:]) < 1:
             return
-        vertices = _ribbons(np.asarray(clip_from_space), segments, viewport[2:], width / 2)
+        vertices = ribbons(np.asarray(clip_from_space), segments, viewport[2:], width / 2)
         self._draw(GL.GL_TRIANGLES, vertices, _LINE, colour, half_width=width / 2, hidden=hidden)
+
+    def bands(
+        self, clip_from_space: np.ndarray, segments: ArrayLike, tones: ArrayLike, widths: ArrayLike
+    ) -> None:
+        """Pieces of lines, each with its colours and width, over everything; pieces of one line just touch.
+
+        Parameters
+        ----------
+        segments
+            (n, 2, 3) end points; those not before the near plane are left out.
+        tones
+            (n, 2, 4) of the ends: linear, premultiplied.
+        widths
+            (n,) pixels.
+        """
+        matrix, viewport = np.asarray(clip_from_space), integers(GL.GL_VIEWPORT, 4)
+        segments = np.asarray(segments, np.float64).reshape(-1, 2, 3)
+        clip = clipped(matrix, segments)
+        before = (clip[..., 2] + clip[..., 3] > 0).all(1)
+        if min(viewport[2:]) < 1 or not before.any():
+            return
+        half = np.asarray(widths, np.float64)[before, None] / 2
+        vertices = ribbons(matrix, segments[before], viewport[2:], half, cap=0.0)
+        vertices[:, 5] = np.repeat(half, 6)
+        tones = np.asarray(tones, np.float64)[before][:, [end for end, _ in CORNERS]].reshape(-1, 4)
+        self._draw(GL.GL_TRIANGLES, np.hstack([vertices, tones]), _BAND, _CLEAR, hidden=False)
+
+    def triangles(self, clip_from_space: np.ndarray, corners: ArrayLike, tones: ArrayLike) -> None:
+        """Triangles (n, 3, 3), over everything; their corners' colours (n, 3, 4), linear, premultiplied."""
+        clip = clipped(np.asarray(clip_from_space), np.asarray(corners, np.float64).reshape(-1, 3))
+        tones = np.asarray(tones, np.float64).reshape(-1, 4)
+        vertices = np.hstack([clip, np.zeros((len(clip), 2)), tones])
+        self._draw(GL.GL_TRIANGLES, vertices, _SHADED, _CLEAR, hidden=False)
 
     def polygon(
         self,
@@ -121,7 +167,7 @@ class Shapes:
         hidden: bool = True,
     ) -> None:
         """A flat convex polygon of one colour; corners (n, 3) in order."""
-        clip = _clip(np.asarray(clip_from_space), np.asarray(corners, np.float64))
+        clip = clipped(np.asarray(clip_from_space), np.asarray(corners, np.float64))
         vertices = np.column_stack([clip, np.zeros((len(clip), 2))])
         self._draw(GL.GL_TRIANGLE_FAN, vertices, _FLAT, colour, hidden=hidden)
 
@@ -133,6 +179,7 @@ class Shapes:
         *,
         background: Sequence[float] = (0, 0, 0, 0),
         opacity: float = 1.0,
+        veil: Sequence[float] = _CLEAR,
         mipmaps: bool = False,
         hidden: bool = True,
     ) -> None:
@@ -146,10 +193,12 @@ class Shapes:
             OpenGL's name of it; linear, premultiplied.
         background
             Colour behind the picture; three numbers: opaque.
+        veil
+            What it is seen through: premultiplied colour, and transparency.
         mipmaps
             Use its smaller copies, which `EyeTarget.make_mipmaps` makes, where it is seen small.
         """
-        clip = _clip(np.asarray(clip_from_space), np.asarray(corners, np.float64).reshape(4, 3))
+        clip = clipped(np.asarray(clip_from_space), np.asarray(corners, np.float64).reshape(4, 3))
         vertices = np.column_stack([clip, [(0, 0), (1, 0), (1, 1), (0, 1)]])
         sampler = self._mipmapped if mipmaps else self._sampler
         self._draw(
@@ -159,6 +208,7 @@ class Shapes:
             background,
             (texture, sampler),
             opacity=opacity,
+            veil=veil,
             hidden=hidden,
         )
 
@@ -166,7 +216,7 @@ class Shapes:
         """Delete what it made."""
         if self._vertices:
             self._program.close()
-            GL.glDeleteVertexArrays(1, [self._vertices])
+            GL.glDeleteVertexArrays(2, [self._vertices, self._shaded])
             GL.glDeleteBuffers(1, [self._buffer])
             GL.glDeleteSamplers(2, [self._sampler, self._mipmapped])
             self._vertices = 0
@@ -181,6 +231,7 @@ class Shapes:
         *,
         half_width: float = 0.0,
         opacity: float = 1.0,
+        veil: Sequence[float] = _CLEAR,
         hidden: bool,
     ) -> None:
         if not len(vertices):
@@ -192,7 +243,10 @@ class Shapes:
             if hidden:
                 GL.glEnable(GL.GL_DEPTH_TEST)
                 GL.glDepthFunc(GL.GL_LEQUAL)
-            if kind != _LINE:  # outlines lie before what they outline, to the last pixel of their width
+            if kind not in (
+                _LINE,
+                _BAND,
+            ):  # outlines lie before what they outline, to the last pixel of their width
                 GL.glEnable(GL.GL_POLYGON_OFFSET_FILL)
                 GL.glPolygonOffset(2.5, 4)
             GL.glDepthMask(hidden)
@@ -200,7 +254,7 @@ class Shapes:
             GL.glBlendEquation(GL.GL_FUNC_ADD)
             GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE_MINUS_SRC_ALPHA)
             GL.glUseProgram(self._program.name)
-            GL.glBindVertexArray(self._vertices)
+            GL.glBindVertexArray(self._shaded if kind >= _SHADED else self._vertices)
             GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._buffer)
             data = np.ascontiguousarray(vertices, np.float32)
             GL.glBufferData(GL.GL_ARRAY_BUFFER, data.nbytes, data, GL.GL_STREAM_DRAW)
@@ -210,44 +264,10 @@ class Shapes:
             GL.glUniform1i(place("kind"), kind)
             GL.glUniform1f(place("half_width"), half_width)
             GL.glUniform1f(place("opacity"), opacity)
+            GL.glUniform4f(place("veil"), *(float(n) for n in veil))
             if picture:
                 GL.glActiveTexture(GL.GL_TEXTURE0)
                 GL.glBindTexture(GL.GL_TEXTURE_2D, picture[0])
                 GL.glBindSampler(0, picture[1])
                 GL.glUniform1i(place("picture"), 0)
             GL.glDrawArrays(primitive, 0, len(data))
-
-
-def _clip(clip_from_space: np.ndarray, points: np.ndarray) -> np.ndarray:
-    return points @ clip_from_space[:, :3].T + clip_from_space[:, 3]
-
-
-def _ribbons(
-    clip_from_space: np.ndarray, segments: np.ndarray, viewport: Sequence[int], half: float
-) -> np.ndarray:
-    """(6 n, 6): two triangles for each segment before the near plane: clip position, pixels off its line."""
-    ends = _clip(clip_from_space, segments)
-    before = ends[..., 2] + ends[..., 3]  # 0 on the near plane
-    ends, before = ends[(before > 0).any(1)], before[(before > 0).any(1)]
-    if not len(ends):
-        return np.empty((0, 6))
-    change = before[:, 1] - before[:, 0]
-    part = np.clip(-before[:, 0] / np.where(change == 0, 1, change), 0, 1)[:, None]
-    cut = ends[:, 0] + part * (ends[:, 1] - ends[:, 0])
-    for end in (0, 1):
-        ends[:, end] = np.where(before[:, [end]] < 0, cut, ends[:, end])
-    pixels = np.asarray(viewport, np.float64) / 2
-    w = np.maximum(ends[..., 3:], np.finfo(np.float64).tiny)
-    on_screen = ends[..., :2] / w * pixels
-    along = on_screen[:, 1] - on_screen[:, 0]
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    along = np.where(length > 1e-9, along / np.maximum(length, 1e-9), [1.0, 0.0])
-    across = np.stack([-along[:, 1], along[:, 0]], -1)
-    reach = half + 1  # a pixel for the smooth edge
-    vertices = []
-    for end, side in ((0, -1), (1, -1), (1, 1), (0, -1), (1, 1), (0, 1)):
-        corner = on_screen[:, end] + side * reach * across + (2 * end - 1) * half * along
-        xy = corner / pixels * w[:, end]
-        off = np.full((len(xy), 1), side * reach)
-        vertices.append(np.concatenate([xy, ends[:, end, 2:], off, np.zeros_like(off)], 1))
-    return np.stack(vertices, 1).reshape(-1, 6)
