@@ -81,7 +81,7 @@ class Renderer:
         self.volume = volume
         self.settings = settings or Settings()
         self.regions = regions or Regions()
-        self.look = look or Look()
+        self._look = look or Look()
         self.last: dict[str, Any] = {}
         self._shadowed: tuple[Any, Shadows] | None = None
         self._transfer = transfer or choose(volume).transfer
@@ -111,6 +111,17 @@ class Renderer:
         before, self._classification = self._classification, classify(self._transfer, self.volume)
         self._classified += not self._classification.hides_like(before)
         self.detail.classify(self._visibility(), self._stored())
+
+    @property
+    def look(self) -> Look:
+        """Lights, and what gradients do to the transfer function."""
+        return self._look
+
+    @look.setter
+    def look(self, look: Look | None) -> None:
+        look = look or Look()
+        self._classified += look.is_plain != self._look.is_plain  # what a sample costs
+        self._look = look
 
     def composite(
         self,

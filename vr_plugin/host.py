@@ -183,7 +183,8 @@ class VolumeInHost:
                 walls.append([])
             walls[n].append(ours.wall)
             drawn[view] = n, view.clip_from_host @ placed
-        look = (volume, self.renderer.transfer, self.renderer.settings, self.renderer.regions)
+        renderer = self.renderer
+        look = (volume, renderer.transfer, renderer.settings, renderer.regions, renderer.look)
         made, compositings, reused = [], 0, 0
         for n, (eye, behind) in enumerate(zip(eyes, walls, strict=True)):
             before = self._eyes[n] if n < len(self._eyes) else None

@@ -109,4 +109,5 @@ def _stage(scene: Scene) -> Stage:
         scene.transfer,
         views if scene.animated else [views[0], views[0]],
         scene.regions,
+        scene.look,
     )

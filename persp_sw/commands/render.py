@@ -142,7 +142,7 @@ def shoot(
     views = scene.views()
     if not scene.animated:  # one view; repeated so that its time is a median
         views = [views[0]] * (1 + max(scene.frames, MIN_FRAMES))
-    renderer = Renderer(volume, scene.transfer, settings, scene.regions, progress)
+    renderer = Renderer(volume, scene.transfer, settings, scene.regions, progress, scene.look)
     progress(0, len(views), "rendering")
     with WarpChoice(renderer, warp, views[0].size) as drawn:
         timing = time_frames(drawn, views, scene.max_seconds)

@@ -147,6 +147,7 @@ class Judgement:
             renderer.transfer,
             view,
             regions=regions,
+            look=renderer.look,
             tolerance=tolerance,
             threads=threads,
             progress=progress,

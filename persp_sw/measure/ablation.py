@@ -26,11 +26,13 @@ def ablate(case: Case, plan: Plan) -> list[Row]:
         for name, settings in switches.items():
             if name == DEFAULT or settings != base:
                 plan.progress(len(contestants), len(switches), "encoding")
-                renderer = Renderer(stage.volume, stage.transfer, settings, stage.regions)
+                renderer = Renderer(stage.volume, stage.transfer, settings, stage.regions, look=stage.look)
                 ours = Ours(renderer, settings)
                 ours.prepare(stage.views[0])
                 contestants.append(({**case.labels, "switch": name, **settings_row(settings)}, ours))
-        truth = plan.truths.of(stage.volume, stage.transfer, stage.views[-1], stage.regions, plan.progress)
+        truth = plan.truths.of(
+            stage.volume, stage.transfer, stage.views[-1], stage.regions, plan.progress, stage.look
+        )
     except PerspSWError as error:
         return [{**case.labels, "switch": DEFAULT, "renderer": "persp_sw", "error": str(error)}]
     rows = time_rows(contestants, stage, truth, plan)

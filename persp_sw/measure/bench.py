@@ -79,10 +79,10 @@ def measure(case: Case, plan: Plan) -> list[Row]:
     try:
         stage = case.open()
         view = stage.views[-1]
-        renderer = Renderer(stage.volume, stage.transfer, plan.settings[0], stage.regions)
+        renderer = Renderer(stage.volume, stage.transfer, plan.settings[0], stage.regions, look=stage.look)
         first = Ours(renderer, plan.settings[0])
         first.prepare(stage.views[0])  # whether it can be rendered shows here
-        truth = plan.truths.of(stage.volume, stage.transfer, view, stage.regions, plan.progress)
+        truth = plan.truths.of(stage.volume, stage.transfer, view, stage.regions, plan.progress, stage.look)
     except PerspSWError as error:
         return [{**case.labels, "renderer": "persp_sw", "error": str(error)}]
     ours = [first, *(Ours(renderer, settings) for settings in plan.settings[1:])]

@@ -17,7 +17,9 @@ import numpy as np
 from ..errors import FileError, PerspSWError
 from ..geometry.regions import Regions
 from ..geometry.view import View
+from ..optics.look import Look
 from ..optics.transfer import TransferFunction
+from ..optics.transfer2d import TransferFunction2D
 from ..volume import phantoms
 from ..volume.files import load
 from ..volume.grid import Volume
@@ -54,9 +56,10 @@ class Stage:
     """
 
     volume: Volume
-    transfer: TransferFunction
+    transfer: TransferFunction | TransferFunction2D
     views: Sequence[View]
     regions: Regions = field(default_factory=Regions)
+    look: Look = field(default_factory=Look)
 
 
 @dataclass(frozen=True)

@@ -61,9 +61,9 @@ def chart_of(case: Case, plan: Plan, qualities: Sequence[float] = QUALITIES) -> 
     """
     stage = case.open()
     view, base = stage.views[-1], plan.settings[0]
-    renderer = Renderer(stage.volume, stage.transfer, base, stage.regions)
+    renderer = Renderer(stage.volume, stage.transfer, base, stage.regions, look=stage.look)
     renderer.render(stage.views[0])  # whether it can be rendered shows here, before the truth is cast
-    truth = plan.truths.of(stage.volume, stage.transfer, view, stage.regions, plan.progress)
+    truth = plan.truths.of(stage.volume, stage.transfer, view, stage.regions, plan.progress, stage.look)
     peers, failed = open_peers(case, stage, plan.peers, truth)
     for row in failed:
         raise PerspSWError(f"{row['case']}, {row['renderer']}: {row['error']}")

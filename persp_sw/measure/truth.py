@@ -17,7 +17,9 @@ from .. import reference
 from ..errors import FileError
 from ..geometry.regions import Regions
 from ..geometry.view import View
+from ..optics.look import Look
 from ..optics.transfer import TransferFunction
+from ..optics.transfer2d import TransferFunction2D
 from ..volume.grid import Volume
 
 TOLERANCE = 1e-4  # of the reference; the pictures are within 1e-6 of the truth or so, see `reference.render`
@@ -58,13 +60,14 @@ class Truths:
     def of(
         self,
         volume: Volume,
-        transfer: TransferFunction,
+        transfer: TransferFunction | TransferFunction2D,
         view: View,
         regions: Regions,
         progress: Callable[[int, int, str], None] | None = None,
+        look: Look | None = None,
     ) -> NDArray[np.float32]:
         """(h, w, 4) linear premultiplied; rounded to float32, 6e-8."""
-        path = self.folder / f"{key_of(volume, transfer, view, regions)}.npz"
+        path = self.folder / f"{key_of(volume, transfer, view, regions, look)}.npz"
         try:
             with path.open("rb") as source, np.load(source, allow_pickle=False) as file:
                 return file["truth"]
@@ -75,6 +78,7 @@ class Truths:
             transfer,
             view,
             regions=regions,
+            look=look,
             tolerance=TOLERANCE,
             threads=self.threads,
             progress=progress,
@@ -90,18 +94,25 @@ class Truths:
         return truth
 
 
-def key_of(volume: Volume, transfer: TransferFunction, view: View, regions: Regions) -> str:
+def key_of(
+    volume: Volume,
+    transfer: TransferFunction | TransferFunction2D,
+    view: View,
+    regions: Regions,
+    look: Look | None = None,
+) -> str:
     """A name for all that a reference picture depends on, the reference's own source included."""
     transfer = transfer.with_unit(min(volume.spacing))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in _REFERENCE_SOURCES))
     parts: list[Any] = [
         *("volume", volume.data.shape, volume.data.dtype.str, volume.world_from_object.tolist()),
-        *("transfer", transfer.points, transfer.opacity_unit),
+        *("transfer", transfer.to_dict()),
         *("view", view.direction_from_pixel.tolist(), view.size),
         *("eye", view.eye.position.tolist(), view.eye.near),
         # From infinity all pixels have one direction: where the wall stands tells their rays apart.
         *(("infinity", view.wall.world_from_pixel.tolist()) if view.eye.is_at_infinity else ()),
-        *("regions", regions.crop, regions.clip, TOLERANCE),
+        *("regions", regions, TOLERANCE),
+        *("look", look or Look()),
     ]
     digest.update(repr(parts).encode())
     digest.update(np.ascontiguousarray(volume.data))

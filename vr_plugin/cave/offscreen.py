@@ -157,7 +157,11 @@ def errors(
     for number, picture in enumerate(frame.pictures):
         progress(number, len(frame.pictures), "reference")
         truth = psw.reference.render(
-            renderer.volume, renderer.transfer, picture.view, regions=renderer.regions
+            renderer.volume,
+            renderer.transfer,
+            picture.view,
+            regions=renderer.regions,
+            look=renderer.look,
         )
         difference = np.abs(drawn.pictures[picture.wall.name, picture.eye] - truth)
         result[picture.wall.name, picture.eye] = {

@@ -143,7 +143,7 @@ def cave(
         settings = settings_for(shown, quality, samples, residual, threads)
         if not (offscreen or in_turn):  # else each image is shown to the eye it was made for
             settings = replace(settings, depth_slabs=slabs)
-        renderer = psw.Renderer(shown.volume, shown.transfer, settings, shown.regions, progress)
+        renderer = psw.Renderer(shown.volume, shown.transfer, settings, shown.regions, progress, shown.look)
         tracker = open_tracker(
             chosen.tracker,
             rest_pose=chosen.eyes.rest_pose,

@@ -153,7 +153,9 @@ def movie(
             turn = 360.0 if degrees is None else degrees
             cameras = turntable(Camera.of_view(view), up, frames or max(round(6 * fps), 1), turn, tilt)
         shot = Shot(chosen.size, stereo, separation, tuple(chosen.background), near, parallel)
-        renderer = psw.Renderer(chosen.volume, chosen.transfer, settings, chosen.regions, progress)
+        renderer = psw.Renderer(
+            chosen.volume, chosen.transfer, settings, chosen.regions, progress, chosen.look
+        )
         figures = take_film(renderer, shot, cameras, file, progress)
     say_missing_voxels(chosen.volume)
     values = {

@@ -123,7 +123,7 @@ def show(
         if volume_file:
             scene = open_scene(volume_file, progress, tf=tf, **keys)
             renderer = psw.Renderer(
-                scene.volume, scene.transfer, psw.Settings(quality=2), scene.regions, progress
+                scene.volume, scene.transfer, psw.Settings(quality=2), scene.regions, progress, scene.look
             )
             values["room_from_world"] = _room_from_world(opened, scene.volume)
         picture = draw_room(opened, renderer=renderer, heads=heads)

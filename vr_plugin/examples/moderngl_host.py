@@ -187,7 +187,7 @@ def open_renderer(path: str) -> psw.Renderer:
     """Of a volume file, or of a scene file with its transfer function."""
     if Path(path).suffix.lower() in (".json", ".toml"):
         scene = psw.Scene.load(path)
-        return psw.Renderer(scene.volume, scene.transfer, psw.Settings(), scene.regions)
+        return psw.Renderer(scene.volume, scene.transfer, psw.Settings(), scene.regions, look=scene.look)
     return psw.Renderer(psw.load(path))
 
 

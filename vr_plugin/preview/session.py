@@ -92,7 +92,7 @@ def open_preview(
     def relay(done: int, total: int, what: str) -> None:
         pictures.progress(done, total, what)  # whoever shows it at the time
 
-    renderer = psw.Renderer(volume, scene.transfer, settings, scene.regions, relay)
+    renderer = psw.Renderer(volume, scene.transfer, settings, scene.regions, relay, scene.look)
     place = room_from_world(rig, volume)
     preset = scene.preset.name if scene.preset else None
 
