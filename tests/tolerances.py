@@ -58,6 +58,13 @@ METRIC = 1e-12
 # interval they are in: a dozen slices give 1e-6.
 CLOSED_FORM = 2e-6
 
+# As COMPOSITE_TWIN. Normals of float32 differences of values below 256 err by 6e-8 · 256 / |g|, here 1e-5
+# where the gradient is a grey level a voxel; highlights of power 50 by 50 times as much, of one of some dozen
+# samples.
+LIT_TWIN = 2e-4
+# A factor of 1 and a few roundings of 6e-8 of colours up to 2; a turned pose moves samples by 1e-6 voxels.
+FLOAT32_LIT = 2e-5
+
 # Kernel in float32, twin in float64: a look-up may fall on the neighbouring table entry, which differs by
 # (0.5 opacity / 255 values) / 8 entries a value = 2.5e-4 of extinction for 8-bit data, in few samples.
 COMPOSITE_TWIN = 3e-4

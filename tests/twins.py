@@ -118,8 +118,13 @@ def ray_range(face, half_spaces, metric):
     return near, far, length
 
 
-def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale, residual):
-    """One pixel of a face, float64: `face` = (eye i j k, sign, t_i, t_j, near). rows [j, k, i]."""
+def composite_pixel(
+    rows, face, box, half_spaces, metric, per_interval, table, origin, scale, residual, lit=None
+):
+    """One pixel of a face, float64: `face` = (eye i j k, sign, t_i, t_j, near). rows [j, k, i].
+
+    `lit`: given a sample's place (i, j, k), what light makes of it; see `lit_twins`.
+    """
     e, sign, t = np.array(face[:3]), face[3], np.array(face[4:6])
     near, far, length = ray_range(face, half_spaces, metric)
     n_j, n_k, n_i = rows.shape
@@ -146,9 +151,13 @@ def composite_pixel(rows, face, box, half_spaces, metric, per_interval, table, o
         value = row[0] + (i - i0) * (row[1] - row[0])
         if np.isnan(value):
             continue
-        r, g, b, tau = table[entries(value, origin, scale, len(table) - 1)].astype(float)
+        entry = entries(value, origin, scale, len(table) - 1)
+        if lit:
+            colour, tau = lit((i, j, k), entry)
+        else:
+            *colour, tau = table[entry].astype(float)
         share = (1 - result[3]) * -np.expm1(-tau * length * weight)
-        result += share * np.array([r, g, b, 1])
+        result += share * np.array([*colour, 1])
         if residual and result[3] >= 1 - residual:
             break
     return result

@@ -264,8 +264,8 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
                 lanes, at, SECOND if waiting else VALUE,
             )  # fmt: skip
             illuminate(
-                n, begin, window_end, y, z, x_first, step, low, high, ray, level, table, scratch, cells,
-                lanes, at, SECOND if waiting else VALUE, light, LIGHT_OF_SECOND if waiting else _NONE,
+                n, start, begin, window_end, y, z, x_first, step, low, high, ray, level, table, scratch,
+                cells, lanes, at, SECOND if waiting else VALUE, light, LIGHT_OF_SECOND if waiting else _NONE,
             )  # fmt: skip
             slot = _ONE if waiting else _NONE
             tiles.slots[slot, 0], tiles.slots[slot, 1] = near, far

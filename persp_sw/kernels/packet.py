@@ -40,8 +40,8 @@ def reach_of(table):
 
 
 def illuminate(
-    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
-    sample_at,
+    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
+    light, sample_at,
 ):  # fmt: skip
     """Find what gradients change of the samples in `section`, if a `table` asks for it and they show
     anything; see `packet_lit.light_up`. Compiled code only.
@@ -103,32 +103,32 @@ def _lit_reach(table):
 
 @inlined_kernel
 def _no_light(
-    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
-    sample_at,
+    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
+    light, sample_at,
 ):  # fmt: skip
     return
 
 
 @inlined_kernel
 def _light_classified(
-    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
-    sample_at,
+    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
+    light, sample_at,
 ):  # fmt: skip
     if shows_classified(n, table, cells, lanes, np.uint64(at), section):
         light_up(
-            n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
+            n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
             np.uint64(at), light, sample_at,
         )  # fmt: skip
 
 
 @inlined_kernel
 def _light_integrated(
-    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
-    sample_at,
+    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
+    light, sample_at,
 ):  # fmt: skip
     if shows_integrated(n, table, cells, lanes, np.uint64(at), section):
         light_up(
-            n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
+            n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
             np.uint64(at), light, sample_at,
         )  # fmt: skip
 
@@ -153,8 +153,8 @@ def _choose_reach(table):
 
 @kernel_by_type(illuminate)
 def _choose_light(
-    n, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section, light,
-    sample_at,
+    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
+    light, sample_at,
 ):  # fmt: skip
     return _by_kind(table, _no_light, _no_light, _light_classified, _light_integrated)
 

@@ -67,12 +67,32 @@ def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cell
 
 @lean_kernel
 def light_up(
-    n, begin, end, y, z, x, step, low, high, ray, level, shades, scratch, cells, lanes, at, light, sample_at
+    n,
+    start,
+    begin,
+    end,
+    y,
+    z,
+    x,
+    step,
+    low,
+    high,
+    ray,
+    level,
+    shades,
+    scratch,
+    cells,
+    lanes,
+    at,
+    light,
+    sample_at,
 ):
     """Light's sections of a packet's samples from their gradients; see `phong.shade`.
 
     Parameters
     ----------
+    start
+        The voxel from which places along i are counted in float32: the same for all windows of a packet.
     begin, end
         The cells of a row that show anything.
     y, z, x, step, low, high
@@ -98,7 +118,8 @@ def light_up(
     )
     slopes = light + NEIGHBOURS
     find_slopes(
-        n, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
+        n, start, begin, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes,
+        slopes,
     )  # fmt: skip
     shade(n, ray, slopes, shades, lanes, at, light, sample_at)
     for number in range(shades.lights.shape[0]):

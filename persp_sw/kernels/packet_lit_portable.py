@@ -48,29 +48,35 @@ def shows_integrated(n, table, cells, lanes, at, section):
 
 
 @inlined_kernel
-def rows_at(level, y, z, first):
-    """Where four rows around scanline y and slice z are stored, from voxel `first` on, and their weights."""
+def rows_at(level, y, z, begin, ahead):
+    """Where four rows around scanline y and slice z are stored, and their weights.
+
+    Positions are those of voxel `begin`, less `ahead`: voxels before are there in the rows of the samples
+    themselves, and in the others need not be.
+    """
     row, slice_ = min(np.floor(y), level.needed.shape[0] - 2.0), np.floor(z)
     j, k = np.uint64(np.int64(row)), np.uint64(np.int64(slice_))
-    at_00 = packed_position(level.needed, level.offsets, j, k, first)
-    at_10 = packed_position(level.needed, level.offsets, j + _ONE, k, first)
+    at_00 = packed_position(level.needed, level.offsets, j, k, begin) - ahead
+    at_10 = packed_position(level.needed, level.offsets, j + _ONE, k, begin) - ahead
     at_01, at_11 = at_00, at_10
     if z != slice_:
-        at_01 = packed_position(level.needed, level.offsets, j, k + _ONE, first)
-        at_11 = packed_position(level.needed, level.offsets, j + _ONE, k + _ONE, first)
+        at_01 = packed_position(level.needed, level.offsets, j, k + _ONE, begin) - ahead
+        at_11 = packed_position(level.needed, level.offsets, j + _ONE, k + _ONE, begin) - ahead
     return at_00, at_10, at_01, at_11, _F(y - row), _F(z - slice_)
 
 
 @inlined_kernel
 def find_slopes(
-    n, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
+    n, start, begin, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
 ):  # fmt: skip
     """Differences per voxel of the volume along i, j and k, in three lines of `lanes` from `slopes` on.
 
     Parameters
     ----------
-    first, last
-        The cells of a row around all neighbours.
+    start
+        The voxel from which places along i are counted in float32: the same for all windows of a packet.
+    begin, first, last
+        The first cell that shows anything, and the cells of a row around all neighbours.
     sides
         (y and z of the neighbours along j and k): two scanlines, two slices.
     others
@@ -79,7 +85,7 @@ def find_slopes(
     Six lines of `lanes` from `slopes` on are overwritten.
     """
     y_low, y_high, z_low, z_high = sides
-    start, columns = np.float64(first), np.float64(level.columns)
+    columns, ahead = np.float64(level.columns), np.int64(begin - first)
     for number in range(6):
         x_n, y_n, z_n = 0.0, y, z
         if number < 2:
@@ -88,23 +94,24 @@ def find_slopes(
             y_n = y_high if number == 3 else y_low
         else:
             z_n = z_high if number == 5 else z_low
-        at_00, at_10, at_01, at_11, weight_j, weight_k = rows_at(level, y_n, z_n, first)
+        at_00, at_10, at_01, at_11, weight_j, weight_k = rows_at(level, y_n, z_n, begin, ahead)
         sample(
             n, np.int64(last - first) + 1, level.voxels, at_00, at_10, at_01, at_11, weight_j, weight_k,
             _F(x + x_n - start), _F(step), _F(max(low + x_n, 0.0) - start),
-            _F(min(high + x_n, columns - 1.0) - start), _F(columns - 2.0 - start), _F(0.0), _F(last - first),
-            scratch, cells, lanes, np.int64(slopes) + TILE * number,
+            _F(min(high + x_n, columns - 1.0) - start), _F(columns - 2.0 - start),
+            _F(np.float64(first) - start), _F(np.float64(last) - start), scratch, cells, lanes, np.int64(slopes) + TILE * number,
         )  # fmt: skip
     per_y, per_z = _F(level.per_voxel[1] / (y_high - y_low)), _F(level.per_voxel[2] / (z_high - z_low))
-    per_voxel, lowest, highest, most = _F(level.per_voxel[0]), _F(low), _F(high), _F(columns - 1.0)
-    x_0, x_step, r = _F(x), _F(step), _F(reach)
+    per_voxel, lowest, highest = _F(level.per_voxel[0]), _F(low - start), _F(high - start)
+    least, most = _F(-start), _F(columns - 1.0 - start)
+    x_0, x_step, r = _F(x - start), _F(step), _F(reach)
     for l in range(np.uint64(n)):  # noqa: E741
         place = x_0 + _F(l) * x_step
         place = place if place > lowest else lowest
         place = place if place < highest else highest
         far, near = place + r, place - r
         far = far if far < most else most
-        near = near if near > _F(0.0) else _F(0.0)
+        near = near if near > least else least
         one, other = lanes[slopes + l], lanes[slopes + _LINE + l]
         along_i = (other - one) * per_voxel / (far - near)
         one, other = lanes[slopes + np.uint64(2) * _LINE + l], lanes[slopes + _THREE * _LINE + l]

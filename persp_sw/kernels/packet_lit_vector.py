@@ -68,8 +68,8 @@ def _finder(registers, between):
         def build(context, builder, signature, arguments):
             data = pointer(context, builder, signature.args[0], arguments[0])
             tile = Tile(builder, pointer(context, builder, signature.args[3], arguments[3]), arguments[4])
-            x, step, low, high, reach, least, most, per_x, per_y, per_z = (
-                simd.everywhere(builder, builder.extract_value(arguments[2], n)) for n in range(10)
+            x, step, low, high, reach, least, most, per_x, per_y, per_z, first = (
+                simd.everywhere(builder, builder.extract_value(arguments[2], n)) for n in range(11)
             )
 
             def line(number):
@@ -96,11 +96,11 @@ def _finder(registers, between):
                 return [b - a for a, b in zip(line(one), line(other), strict=True)]
 
             def look_up(values, cell, weight):
-                left, right = pick(builder, values, cell), pick(builder, values, cell + 1.0)
+                left, right = pick(builder, values, cell - first), pick(builder, values, cell - first + 1.0)
                 return left + weight * (right - left)
 
             def place_of(x):
-                cell = x.floor().at_most(most - 1.0).at_least(0.0)
+                cell = x.floor().at_most(most - 1.0)
                 return cell, x - cell
 
             x = (simd.constant(builder, list(range(TILE))) * step + x).at_least(low).at_most(high)
@@ -115,7 +115,7 @@ def _finder(registers, between):
 
         row = types.Tuple([types.int64] * 4 + [types.float32] * 2)
         arguments = (
-            voxels, types.UniTuple(row, 5), types.UniTuple(types.float32, 10), lanes, types.int64
+            voxels, types.UniTuple(row, 5), types.UniTuple(types.float32, 11), lanes, types.int64
         )  # fmt: skip
         return types.void(*arguments), build
 
@@ -128,17 +128,17 @@ _between, _between_wide = _finder(2, True), _finder(4, True)
 
 @inlined_kernel
 def find_slopes(
-    n, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
+    n, start, begin, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes, slopes
 ):  # fmt: skip
     """See `packet_lit_portable.find_slopes`."""
     y_low, y_high, z_low, z_high = sides
-    start = np.float64(first)
+    ahead = np.int64(begin - first)
     rows = (
-        rows_at(level, y, z, first),
-        rows_at(level, y_low, z, first),
-        rows_at(level, y_high, z, first),
-        rows_at(level, y, z_low, first),
-        rows_at(level, y, z_high, first),
+        rows_at(level, y, z, begin, ahead),
+        rows_at(level, y_low, z, begin, ahead),
+        rows_at(level, y_high, z, begin, ahead),
+        rows_at(level, y, z_low, begin, ahead),
+        rows_at(level, y, z_high, begin, ahead),
     )
     numbers = (
         _F(x - start),
@@ -151,6 +151,7 @@ def find_slopes(
         _F(level.per_voxel[0]),
         _F(level.per_voxel[1] / (y_high - y_low)),
         _F(level.per_voxel[2] / (z_high - z_low)),
+        _F(np.float64(first) - start),
     )
     at = np.int64(slopes)
     narrow = last - first < np.uint64(NARROW)
