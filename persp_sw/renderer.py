@@ -166,8 +166,10 @@ class Renderer:
     def _composite(self, plan: Callable[[], EyePlan], cancel: Cancel | None) -> EyeImage:
         compiled, encoded = _jit.compile_seconds(), self.detail.encode_seconds
         start = perf_counter()
-        appearance = Appearance(self._classification, self.look, self._shadows())
-        shadowed = perf_counter() - start - (_jit.compile_seconds() - compiled)
+        before, appearance = self._shadowed, Appearance(self._classification, self.look, self._shadows())
+        # None at all where no shadows were made: a frame that encoded something tells nothing of the next.
+        making = perf_counter() - start - (_jit.compile_seconds() - compiled)
+        shadowed = making if self._shadowed is not before else 0.0
         image = composite_eye(self.detail, appearance, self.regions, self.settings, plan(), cancel)
         spent = perf_counter() - start
         compiled = _jit.compile_seconds() - compiled
