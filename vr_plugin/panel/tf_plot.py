@@ -17,7 +17,7 @@ _COLUMNS = 160  # of the picture under the curve
 _TICKS = (0.0, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 _LINEAR_TICKS = (0.0, 0.25, 0.5, 0.75, 1.0)
 _STRAY = 0.0005  # part of the voxels that lie beyond what is shown at first
-_ROOM = 1.04  # above the highest opacity
+_ROOM = 0.06  # below no opacity and above the highest, for their points to be taken
 
 
 class TransferPlot:
@@ -56,7 +56,7 @@ class TransferPlot:
         wide = 0.5 * (self._limits[1] - self._limits[0])
         limits = self._limits[0] - wide, self._limits[1] + wide
         implot.setup_axis_limits_constraints(implot.ImAxis_.x1, *limits)
-        implot.setup_axis_limits(implot.ImAxis_.y1, 0.0, _ROOM, implot.Cond_.always)
+        implot.setup_axis_limits(implot.ImAxis_.y1, -_ROOM, 1 + _ROOM, implot.Cond_.always)
         ticks = _LINEAR_TICKS if self._edit.axis.knee is None else _TICKS
         positions = [float(self._edit.axis.position(tick)) for tick in ticks]
         implot.setup_axis_ticks(implot.ImAxis_.y1, positions, [f"{tick:g}" for tick in ticks])

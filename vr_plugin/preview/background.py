@@ -30,14 +30,18 @@ class Background:
         self._editor: Worker[Wanted, Finished] | None = None
         self._asked_for: tuple[object, ...] = ()  # of the editor, `Wanted.eye_images`
 
-    def edited(self, wanted: Wanted) -> Finished | None:
-        """The newest finished edit; `wanted` is begun as soon as the one under way is finished."""
+    def edited(self, wanted: Wanted, patience_s: float = 0.0) -> Finished | None:
+        """The newest finished edit; `wanted` is begun as soon as the one under way is finished.
+
+        `patience_s`: how long it may be waited for.
+        """
         if self._editor is None:
             self.give_up()
             self._editor, self._asked_for = Worker(self._edit, "editing"), ()
         if self._asked_for != wanted.eye_images:
             self._asked_for = wanted.eye_images
             self._editor.ask(wanted)
+        self._editor.wait(patience_s)
         return self._editor.newest()
 
     @property

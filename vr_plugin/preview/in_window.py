@@ -35,7 +35,9 @@ if TYPE_CHECKING:
 _FRAMES_FOR_A_RATE = 3
 _REST_SECONDS = 0.25  # how long nothing happens before we look again whether something did
 _REFINING_SECONDS = 0.01  # how long before we look again whether a better picture is finished
-_EDITING_SECONDS = 0.002  # the same for the picture of an edit, which a hand waits for
+# How long an edit's picture is waited for before the panel is drawn without it: a frame of both is half the
+# work of two, and the thread has the processor to itself.
+_EDITING_SECONDS = 0.08
 _log = logging.getLogger("persp_sw")
 
 
@@ -229,13 +231,11 @@ class PreviewLoop:
 
     def _edit(self, wanted: Wanted) -> None:
         """Have the newest edit's picture made, show those that are finished, and the panel meanwhile."""
-        edited = self.background.edited(wanted)
+        edited = self.background.edited(wanted, _EDITING_SECONDS)
         if edited is not None and edited.done is not self._shown:
             self._show(wanted, edited.done, of=edited.wanted)
         elif wanted.moving or self._panel.wants_frame:
             self._show(wanted, self._shown, is_new=False)
-        else:
-            self._pause(_EDITING_SECONDS)
 
     def _refine(self, wanted: Wanted) -> None:
         """Show a better picture where there is one, and have the next one made."""
