@@ -13,7 +13,7 @@ from vr_plugin.panel.frontend import Panel
 from vr_plugin.preview.in_window import run_window
 from vr_plugin.preview.session import open_preview
 
-SIZE = (900, 640)
+SIZE = (800, 580)  # two of them fit on the virtual screen, one below the other
 TRANSFER = psw.TransferFunction(
     [(30.0, (0.2, 0.1, 0.4), 0.0), (80.0, (0.1, 0.6, 0.3), 0.05), (160.0, (0.9, 0.7, 0.2), 0.4)], 1.0
 )

@@ -33,6 +33,7 @@ class Preview(Program):
 
     def __init__(self, display: str, folder: Path, shown: str, *more: object, name: str = "body"):  # noqa: F811
         self.display, self.title = display, f"{name}: persp-sw view"
+        self._top = 0 if name == "body" else SIZE[1]
         self._process = subprocess.Popen(
             [sys.executable, "-W", "error", str(ROOT / "tests/panel_program.py"), str(folder), name, shown]
             + [str(word) for word in more],
@@ -47,7 +48,7 @@ class Preview(Program):
         self._reader.start()
 
     def __enter__(self) -> Preview:
-        self.hand("windowmove", self.window(self.title), 0, 0)
+        self.hand("windowmove", self.window(self.title), 0, self._top)
         self.focus(self.title)
         return self
 
@@ -64,7 +65,7 @@ class Preview(Program):
 
     def picture(self) -> np.ndarray:
         """(h, w, 3) uint8: what the window shows now."""
-        return self.grab()[: SIZE[1], : SIZE[0]]
+        return self.grab()[self._top : self._top + SIZE[1], : SIZE[0]]
 
     def until(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
         """The state, once it is so."""
@@ -86,6 +87,13 @@ class Preview(Program):
             before = picture
             time.sleep(0.3)
         pytest.fail("the picture never came to rest")
+
+    def until_shown(self, picture: np.ndarray) -> None:
+        """Wait until the window's left columns are these, bit for bit."""
+        end = time.monotonic() + SECONDS
+        while not (self.picture()[:, : picture.shape[1]] == picture).all():
+            assert time.monotonic() < end, "that picture never came"
+            time.sleep(0.05)
 
     def drag(self, start: tuple[float, float], by: tuple[float, float], button: int = 1) -> None:
         """Press, move in steps, let go."""
@@ -167,16 +175,16 @@ def test_a_dragged_point_is_where_the_pixels_say_and_the_picture_is_that_functio
     assert (edited[:, columns] == without[:, columns]).all()
     preview.focus(preview.title)
     preview.hand("key", "F2", *PAUSE)
-    assert (preview.at_rest() == without).all()
+    preview.until_shown(without)
     preview.hand("key", "F2", *PAUSE)
 
     # Undo restores the bits of function and picture; redo, too.
     preview.hand("key", "ctrl+z", *PAUSE)
     preview.until(is_about(TRANSFER))
-    assert (preview.at_rest()[:, columns] == home[:, columns]).all()
+    preview.until_shown(home[:, columns])
     preview.hand("key", "ctrl+shift+z", *PAUSE)
     preview.until(lambda state: state["points"] == dragged["points"])
-    assert (preview.at_rest()[:, columns] == edited[:, columns]).all()
+    preview.until_shown(edited[:, columns])
     preview.leave()
 
 
@@ -228,6 +236,7 @@ def test_what_is_typed_into_a_field_is_for_the_field(preview: Preview):
 
 
 def test_a_side_of_the_box_follows_its_handle(preview: Preview):
+    preview.click("Transfer function")  # closed, so that all of the next section is seen
     preview.click("Clipping and cropping")
     state = preview.until(lambda state: "crop 0" in state["places"])
     before, camera = state["places"]["crop 0"], state["camera"]
