@@ -89,9 +89,9 @@ RESERVED = {
     "glfw": {"vr_plugin.window"},
     # frontend: context, input and drawing; the others: widgets. What they edit knows nothing of them.
     "imgui_bundle": {
-        f"vr_plugin.panel.{name}" for name in ("frontend", "sections", "tf_plot", "view_handles")
+        f"vr_plugin.panel.{name}"
+        for name in ("frontend", "sections", "light_section", "tf_plot", "view_handles")
     },
-    "imageio_ffmpeg": {"vr_plugin.film.files"},
     # A host that is not ours, in the example of the plug-in only: nobody needs these packages to use it.
     "moderngl": {f"vr_plugin.examples.moderngl_{part}" for part in ("host", "scene")},
     "moderngl_window": {"vr_plugin.examples.moderngl_host"},

@@ -227,3 +227,56 @@ def test_counts_of_values_are_of_every_voxel_of_a_small_volume():
     holes = data.astype(np.float32)
     holes[0, 0, 0] = np.nan
     assert psw.value_counts(psw.Volume(holes), 8)[0].sum() == 7
+
+
+# --- light -------------------------------------------------------------------------------------------------
+
+
+def test_light_is_switched_changed_and_comes_back_as_it_was(desk: Desk):
+    assert desk.look.is_plain
+    desk.shade(True)
+    assert desk.choices.edits.look == psw.Look(psw.Lighting())
+    desk.set_lighting(ambient=0.5, model="blinn")
+    desk.set_light(0, psw.Light((1, 0, 0)))
+    desk.set_light(1, psw.Light((0, 1, 0), shadows=True))
+    desk.set_light(0, psw.Light((0, 0, 1)))
+    lit = psw.Lighting(0.5, model="blinn", lights=(psw.Light((0, 0, 1)), psw.Light((0, 1, 0), shadows=True)))
+    assert desk.look.lighting == lit
+    desk.shade(False)
+    assert desk.look.is_plain
+    desk.shade(True)
+    assert desk.look.lighting == lit
+    desk.set_light(0, None)
+    assert desk.look.lighting.lights == lit.lights[1:]
+    desk.modulate(psw.Modulation(high=0.5))
+    assert desk.look.modulation.high == 0.5
+    desk.reset_look()
+    assert desk.choices.edits.look is None and desk.look.is_plain
+
+
+def test_the_light_of_the_desk_is_that_of_the_pictures(desk: Desk):
+    pictures, preview = desk._pictures, desk.preview
+    plain = pictures.composite(preview.advance(0.0)).inside.pictures[0]
+    desk.shade(True)
+    desk.set_lighting(ambient=0.1)
+    lit = pictures.composite(preview.advance(0.1)).inside.pictures[0]
+    renderer = psw.Renderer(
+        desk.volume, desk.transfer, pictures.renderer.settings, look=psw.Look(psw.Lighting(ambient=0.1))
+    )
+    expected = renderer.render(lit.view)
+    np.testing.assert_array_equal(pictures.renderer.warp(lit.image, lit.view), expected)
+    assert np.abs(expected - pictures.renderer.warp(plain.image, plain.view)).max() > 0.01
+    desk.reset_look()
+    again = pictures.composite(preview.advance(0.2)).inside.pictures[0]
+    before = pictures.renderer.warp(plain.image, plain.view)
+    np.testing.assert_array_equal(pictures.renderer.warp(again.image, again.view), before)
+
+
+def test_a_window_by_dragging_is_one_step(desk: Desk):
+    own = desk.transfer
+    for width in (50.0, 60.0, 70.0):
+        desk.choices.window = (100.0, width)
+        desk.take_over()
+    desk.edit.undo()
+    desk.hand_over()
+    assert desk.transfer is own

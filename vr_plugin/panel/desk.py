@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Desk:
     def __init__(self, choices: Choices, pictures: PreviewPictures):
         self.choices, self._pictures = choices, pictures
         self.volume: psw.Volume = pictures.renderer.volume
+        self._lighting = psw.Lighting()  # what light comes back to
         low, high = self.volume.value_range
         self.edit = TransferEdit(self.transfer, (float(low), float(high)))
 
@@ -49,7 +50,8 @@ class Desk:
     def take_over(self) -> None:
         """Let the editor know what keys have changed: another preset is a step that can be undone."""
         if self.edit.transfer is not self.transfer:
-            self.edit.apply(self.transfer)
+            dragged = "window" if self.choices.window else None  # level and width: a drag is one step
+            self.edit.apply(self.transfer, dragged)
 
     def hand_over(self) -> None:
         """Show what the editor has."""
@@ -79,6 +81,44 @@ class Desk:
         """The frame rate that quality follows; 0: none."""
         asked = self.choices.edits.target_hz
         return self._pictures.target_hz if asked is None else asked
+
+    # --- light ---------------------------------------------------------------------------------------------
+
+    @property
+    def look(self) -> psw.Look:
+        """How it is lit."""
+        return self.choices.edits.look or self._pictures.scene_look
+
+    def set_look(self, look: psw.Look) -> None:
+        """Light it otherwise; the same look is no edit."""
+        if look != self.look:
+            self.choices.edits = replace(self.choices.edits, look=look)
+
+    def reset_look(self) -> None:
+        """The scene's own."""
+        self.choices.edits = replace(self.choices.edits, look=None)
+
+    def shade(self, lit: bool) -> None:
+        """Light it as it was lit last, or at first by a headlight; or not at all."""
+        if lit == (self.look.lighting is not None):
+            return
+        if not lit:
+            self._lighting = self.look.lighting
+        self.set_look(replace(self.look, lighting=self._lighting if lit else None))
+
+    def set_lighting(self, **changes: Any) -> None:
+        """Other fields of the `Lighting`, which must be on."""
+        self.set_look(replace(self.look, lighting=replace(self.look.lighting, **changes)))
+
+    def set_light(self, number: int, light: psw.Light | None) -> None:
+        """Another light in the place of one; None removes it; the number after the last adds one."""
+        lights = list(self.look.lighting.lights)
+        lights[number : number + 1] = [] if light is None else [light]
+        self.set_lighting(lights=tuple(lights))
+
+    def modulate(self, modulation: psw.Modulation | None) -> None:
+        """Show more of boundaries, or all as the transfer function has it."""
+        self.set_look(replace(self.look, modulation=modulation))
 
     # --- regions -------------------------------------------------------------------------------------------
 

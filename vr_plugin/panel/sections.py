@@ -15,6 +15,7 @@ from ..rig import STEREO_MODES
 from ..stereo import MODES
 from .colours import decoded, encoded
 from .desk import Desk
+from .light_section import LightSection
 from .statistics import SECONDS, Recent
 from .tf_plot import TransferPlot
 
@@ -42,6 +43,7 @@ class Sections:
         self.shows_handles = False
         self._preview, self._choices, self._places = preview, preview.choices, places
         self._plot = TransferPlot(desk.edit, desk.volume, places)
+        self._light = LightSection(desk, self._mark, self._button)
         self._file, self._handles_wanted = "transfer.json", True
         inputs = implot.get_input_map()
         inputs.pan = inputs.fit = imgui.MouseButton_.middle  # the left button moves points
@@ -59,6 +61,7 @@ class Sections:
         imgui.push_item_width(-8.0 * imgui.get_font_size())
         for title, show, flag in (
             ("Transfer function", self._transfer, _OPEN),
+            ("Light", lambda: self._light.show(self._preview.wanted.camera.axes), 0),
             ("Clipping and cropping", self._regions, 0),
             ("Quality and stereo", self._quality, _OPEN),
             ("Statistics", self._statistics, _OPEN),

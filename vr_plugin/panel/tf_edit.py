@@ -137,10 +137,10 @@ class TransferEdit:
         """Show opacities on a logarithmic axis, or on a linear one."""
         self.axis = psw.editing.LOGARITHMIC if logarithmic else psw.editing.LINEAR
 
-    def apply(self, transfer: psw.TransferFunction) -> None:
-        """Another function altogether: a preset's, or a file's."""
+    def apply(self, transfer: psw.TransferFunction, gesture: Hashable = None) -> None:
+        """Another function altogether: a preset's, or a file's; those of one gesture are one step."""
         self.selected = None
-        self._do(transfer)
+        self._do(transfer, gesture)
 
     def undo(self) -> None:
         """One step back."""

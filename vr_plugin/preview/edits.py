@@ -17,10 +17,13 @@ class Edits:
         The transfer function.
     regions
         Which part is shown.
+    look
+        Lights, and what gradients do.
     target_hz
         The frame rate that quality follows; 0: none.
     """
 
     transfer: psw.TransferFunction | None = None
     regions: psw.Regions | None = None
+    look: psw.Look | None = None
     target_hz: float | None = None

@@ -102,7 +102,7 @@ class PreviewPictures:
         self.near = near
         self.progress: Callable[[int, int, str], None] = lambda done, total, what: None
         self._transfer_of, self._transfers = transfer_of, {preset: renderer.transfer}
-        self._preset, self._regions = preset, renderer.regions
+        self._preset, self._regions, self._look = preset, renderer.regions, renderer.look
         self.marks = PictureMarks(renderer, psw.marks.Palette.over(self.background))
         self._canvases: dict[str, psw.Canvas] = {}
         self._base = renderer.settings
@@ -168,6 +168,11 @@ class PreviewPictures:
     def scene_regions(self) -> psw.Regions:
         """Which part is shown where nothing was edited."""
         return self._regions
+
+    @property
+    def scene_look(self) -> psw.Look:
+        """How it is lit where nothing was edited."""
+        return self._look
 
     def shows_preset(self, name: str | None) -> bool:
         """Whether the renderer's transfer function is the one of this name, or was changed from it."""
@@ -259,6 +264,7 @@ class PreviewPictures:
         regions = edits.regions or self._regions
         if regions is not renderer.regions:
             renderer.regions = regions
+        renderer.look = edits.look or self._look
         target_hz = self._scene_hz if edits.target_hz is None else edits.target_hz
         # Another function, another ladder; but not while a hand changes it.
         if (wanted.preset, target_hz) != (self._preset, self._asked_hz):
