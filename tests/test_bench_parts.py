@@ -173,6 +173,14 @@ def test_a_reference_is_known_by_all_it_depends_on(small):
         (volume, transfer, view, psw.Regions(crop=(0, 9, 0, 9, 0, 9))),
         (volume, transfer, view, psw.Regions(clip=[(1, 0, 0, -3)])),
         *((volume, transfer, other, regions) for other in (*parallel, aside)),
+        (volume, transfer, view, psw.Regions(cut=[psw.Cut((1, 0, 0, -3), 2)])),
+        (volume, transfer, view, psw.Regions([1, 2, 1, 2, 1, 2])),
+        (volume, transfer, view, psw.Regions([1, 2, 1, 2, 1, 2], crop_flags="fence")),
+        (volume, transfer, view, regions, psw.Look(psw.Lighting())),
+        (volume, transfer, view, regions, psw.Look(psw.Lighting(lights=(psw.Light((0, 0, 1)),)))),
+        (volume, transfer, view, regions, psw.Look(None, psw.Modulation())),
+        (volume, psw.TransferFunction2D([psw.Box((0, 9), (0, 9), (1, 1, 1), 0.5)]), view, regions),
+        (volume, psw.TransferFunction2D([psw.Box((0, 9), (0, 9), (1, 1, 1), 0.4)]), view, regions),
     ]
     assert len({truth.key_of(*variant) for variant in variants}) == len(variants)
     assert truth.key_of(*small) == truth.key_of(*small)

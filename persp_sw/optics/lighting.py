@@ -28,7 +28,8 @@ class Light:
     colour
         Linear r, g, b, each 0 … 1000.
     shadows
-        Whether the volume shadows itself from it.
+        Whether the volume shadows itself from it: at each place the light is dimmed by the transmittance of
+        what is shown on the straight way towards it; where that begins, `Lighting` says (`shadow_offset`).
 
     Raises
     ------

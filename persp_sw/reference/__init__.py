@@ -4,7 +4,8 @@ It shares no kernel and no factorization with what it judges, and has no samplin
 interpolated scalar is a cubic polynomial inside each cell, so every ray is cut where it crosses a voxel plane
 and where the scalar crosses a control point of the transfer function. On each piece that remains extinction
 and colour are smooth, and Gauss's rule, halved until nothing changes, converges fast; a step of the transfer
-function falls between pieces and cannot be missed, however thin the shell it lights.
+function falls between pieces and cannot be missed, however thin the shell it lights. Where gradients count,
+for lights, modulation or a two-dimensional function, a caster of its own cuts rays where they bend, too.
 """
 
 from __future__ import annotations
@@ -108,10 +109,11 @@ def render(
     Each pixel within about `tolerance`, usually 1e-3 of it; never better than about 1e-12. A ray stops at
     transmittance 1e-9. Takes 4 bytes a voxel besides the volume.
 
-    Lit, modulated and 2D pictures: where the gradient bends, rays are cut, too. What the gradient decides has
-    no closed form: a highlight or a window of magnitudes that a ray crosses within a hundredth of a voxel may
-    be missed. A shadow's transmittance is found by a ray for every sample, and settled to a 32nd of the
-    tolerance: such pictures take minutes where many voxels are seen, so keep them small.
+    Lit, modulated and 2D pictures: rays are cut where the gradient bends, too. What else the gradient decides
+    has no closed form: a highlight or a window of magnitudes that a ray passes within an eighth of a cell may
+    be missed. A shadow is a ray of its own for every place, settled to a 32nd of the tolerance; a sharp edge
+    of one, on something seen through, may cost a 70th of a cell's light. Such pictures take minutes where
+    much is seen through: keep them small.
 
     Source: Max, *Optical models for direct volume rendering*, 1995, section 4; the rule on a piece is the
     three-stage Gauss method, Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I*, II.7.

@@ -7,7 +7,7 @@ import numpy as np
 from .._jit import kernel
 from ._material import look_up, material_zones, may_show
 from ._plain import MAX_HALVINGS
-from ._rays import OPAQUE_DEPTH, cut_ray, is_shown
+from ._rays import OPAQUE_DEPTH, at_plane, cut_ray, is_shown
 from ._stretch import (
     cut_at_breaks,
     gradient_on,
@@ -18,6 +18,7 @@ from ._stretch import (
     value_on,
 )
 
+_LOOKS, _LOOKED_HALVINGS = 8, 3  # as `_lit`
 _INWARD = np.sqrt(15.0) / 10  # of Gauss' three places, from the middle
 
 
@@ -37,6 +38,20 @@ def transmittance_to(field, material, shown, point, along, tolerance, stretch, e
             if depth > OPAQUE_DEPTH:
                 return 0.0
     return np.exp(-depth)
+
+
+@kernel
+def way_out(point, along, shown):
+    """Number of the first plane on the way from a point to the light; where it changes, shadows bend."""
+    best, nearest = 0, np.inf
+    for k in range(len(shown.planes)):
+        plane = shown.planes[k]
+        slope = plane[0] * along[0] + plane[1] * along[1] + plane[2] * along[2]
+        if slope != 0:
+            reach = -at_plane(point, along, 0.0, plane) / slope
+            if 0 < reach < nearest:
+                best, nearest = k, reach
+    return best
 
 
 @kernel
@@ -93,6 +108,10 @@ def _depth_of(field, material, stretch, piece, start, end, length, tolerance, de
     # Panel number `index` of 2^level; after the second half of a panel its whole is done.
     level, index, width = 0, 0, end - start
     before = _steps_at(field, material, stretch, start)
+    least = 0
+    for n in range(1, _LOOKS):
+        if _steps_at(field, material, stretch, start + n / _LOOKS * width) != before:
+            least = _LOOKED_HALVINGS
     while not (level == 0 and index == 1):
         here, half = start + index * width, 0.5 * width
         whole = length * _gauss(field, material, stretch, piece, here, width)
@@ -105,8 +124,7 @@ def _depth_of(field, material, stretch, piece, start, end, length, tolerance, de
         change = abs(np.exp(-whole) - np.exp(-halves))
         if before != between or between != after:
             change = max(change, -np.expm1(-max(whole, halves)))  # a step may hide between the places
-        coarse = level == 0 and material.asks_gradient
-        if (coarse or change * np.exp(-depth) > tolerance) and level < MAX_HALVINGS:
+        if (level < least or change * np.exp(-depth) > tolerance) and level < MAX_HALVINGS:
             level += 1
             index *= 2
             width = half
