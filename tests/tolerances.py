@@ -40,10 +40,9 @@ LIT_SURFACE = 2e-4
 # as many of colour where normals turn over; half of a sample each, of either sign.
 MIDPOINT_LIT = 1e-3
 
-# Rays of 14 units and shadows of up to 10 in steps h of 0.023 and 0.05, on functions without steps whose
-# extinction bends a few times by up to 0.7 a unit: (few) · 0.7 · 0.05² · brightness 2, and the sign of
-# normals that turn over, in half a sample of 0.7 · 0.023 at most.
-MIDPOINT_SHADOW = 8e-3
+# Rays of 14 units and shadows of up to 10 in steps h of 0.035 and 0.083, on functions without steps, whose
+# extinction bends some ten times by up to 0.7 a unit: 10 · 0.7 · 0.083² / 8 / 3 (of either sign) = 2e-3.
+MIDPOINT_SHADOW = 2e-3
 # Voxels. A ball of radius 4, interpolated, lies up to ¾ / (2 · 4) within the true one, its shadow as well.
 SHADOW_EDGE = 0.15
 
