@@ -19,6 +19,8 @@ from virtual_screen import SECONDS, Program, display, environment  # noqa: F401 
 
 import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
+from vr_plugin.film.flight_file import load_flight
+from vr_plugin.preview.saved_view import SavedView
 from vr_plugin.room.painter import BACKGROUND
 
 pytestmark = pytest.mark.gl
@@ -160,11 +162,41 @@ def test_hands_move_the_view_and_keys_change_it(preview: Preview, tmp_path: Path
     preview.hand("key", "o")
     preview.until(lambda p: covered(p[:40, :200]) > 0.02)
     preview.hand("key", "F1")
-    preview.until(lambda p: covered(p[150:250, :100]) > 0.02)  # where nothing was before
+    preview.until(lambda p: covered(p[180:280, 114:150]) > 0.05)  # where nothing was before
     preview.hand("key", "Escape", "key", "Escape")
     values = preview.leave()
     assert values["screenshots"] == [str(file)]
     assert values["frames"] > 10
+
+
+@pytest.mark.parametrize("preview", [("--target", 1000, "--shot-size", 640, 200)], indirect=True)
+def test_flights_sessions_and_large_pictures_are_kept(preview: Preview, tmp_path: Path):
+    home = preview.until(lambda p: covered(p) > 0.1)
+    preview.hand("key", "F9")
+    preview.hand(*DRAG)
+    preview.until(lambda p: apart(p, home) > 1)
+    time.sleep(0.5)
+    for key, name in (("F9", "flight-001.csv"), ("F5", "001.session.toml"), ("p", "view-001.png")):
+        preview.hand("key", key)
+        end = time.monotonic() + SECONDS
+        while not (tmp_path / f"body-{name}").exists() and time.monotonic() < end:
+            time.sleep(0.1)
+    preview.hand("key", "Escape")
+    values = preview.leave()
+    assert [Path(name).name for name in values["screenshots"]] == [
+        "body-flight-001.csv", "body-001.session.toml", "body-view-001.png",
+    ]  # fmt: skip
+    # The flight ends where the session stands, and the picture is the renderer's from there: full quality.
+    session = psw.Scene.load(tmp_path / "body-001.session.toml")
+    flight = load_flight(tmp_path / "body-flight-001.csv")
+    assert flight.eye_way > 1
+    np.testing.assert_allclose(flight.keys[-1].camera.position, session.keys.eye, atol=1e-9)
+    camera = SavedView.of_scene(session).camera_of(session)
+    image = psw.Renderer(session.volume, session.transfer).render(
+        psw.View.through_wall(camera.position, camera.wall((640, 200)))
+    )
+    with Image.open(tmp_path / "body-view-001.png") as picture:
+        assert np.array_equal(np.asarray(picture), psw.images.presented(image))
 
 
 def test_flight_and_the_room_from_outside(preview: Preview):
