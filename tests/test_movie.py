@@ -170,6 +170,21 @@ def test_a_parallel_scene_turns_in_parallel(ball_file: Path):
         Shot(SIZE, "anaglyph", parallel=True)
 
 
+def test_a_turntable_shows_all_of_the_volume_all_the_time_unless_the_eye_is_given(tmp_path: Path):
+    """A long box, every voxel of it seen: no frame has any of it at its border."""
+    np.save(tmp_path / "box.npy", np.full((8, 12, 60), 200, np.uint8))
+    tf = [[0, 1, 1, 1, 0.5], [255, 1, 1, 1, 0.5]]
+    (tmp_path / "box.json").write_text(json.dumps({"volume": "box.npy", "tf": tf}))
+    options = ("--frames", 6, "--size", 64, 40, "--up", 0, 1, 0, "--axis", 0, 0, 1)
+    result_of("movie", tmp_path / "box.json", *options, "-o", tmp_path / "all")
+    for picture in pictures_of(tmp_path / "all"):
+        assert picture.max() > 100
+        assert max(edge.max() for edge in (picture[0], picture[-1], picture[:, 0], picture[:, -1])) == 0
+    near = ("--eye", 30, -40, 4, "--fovy", 20)
+    result_of("movie", tmp_path / "box.json", *options, *near, "-o", tmp_path / "near")
+    assert pictures_of(tmp_path / "near")[0][:, 0].max() > 100
+
+
 def test_layouts_of_the_command_are_those_there_are():
     assert movie.LAYOUTS == shots.LAYOUTS
     with pytest.raises(StereoError, match="a film is mono"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import click
+import numpy as np
 
 from persp_sw.commands.options import (
     camera_options,
@@ -52,7 +53,8 @@ file; of pictures, those that are finished stay.
     "degrees",
     type=float,
     metavar="DEGREES",
-    help="Turn the volume by so much about --axis. [default: 360]",
+    help="Turn around the volume by so much, about --axis; from where all of it is seen all the time, where "
+    "no --eye is given. [default: 360]",
 )
 @click.option(
     "--axis", type=float, nargs=3, metavar="X Y Z", help="Of the turntable, world. [default: up of the scene]"
@@ -130,7 +132,8 @@ def movie(
     from ..film.flight import FlightError
     from ..film.flight_file import load_flight
     from ..film.shots import Shot
-    from ..film.turntable import turntable
+    from ..film.turntable import far_enough, turntable
+    from ..placement import corners_in_room
 
     if flight_file and (degrees is not None or axis or tilt):
         raise FlightError("--path is a flight, --turntable, --axis and --tilt are not: give one or the other")
@@ -151,7 +154,16 @@ def movie(
             parallel, near = view.eye.is_at_infinity, view.eye.near
             up = axis or chosen.keys.up or (0.0, 0.0, 1.0)
             turn = 360.0 if degrees is None else degrees
-            cameras = turntable(Camera.of_view(view), up, frames or max(round(6 * fps), 1), turn, tilt)
+            count = frames or max(round(6 * fps), 1)
+
+            def around(home: Camera) -> list[Camera]:
+                return turntable(home, up, count, turn, tilt)
+
+            home, volume = Camera.of_view(view), chosen.volume
+            if chosen.keys.eye is None and not parallel:
+                cameras = far_enough(home, around, corners_in_room(np.eye(4), volume), chosen.size)
+            else:
+                cameras = around(home)
         shot = Shot(chosen.size, stereo, separation, tuple(chosen.background), near, parallel)
         renderer = psw.Renderer(
             chosen.volume, chosen.transfer, settings, chosen.regions, progress, chosen.look

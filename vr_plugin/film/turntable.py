@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
+
+import persp_sw as psw
 
 from ..cameras import Camera
 from ..pose import Vector
 from .flight import FlightError
+
+_STEP_BACK = 1.02
+_MARGIN = 0.04  # of a frame's shorter side: more than a pixel of the eye image, which smooths the corners
 
 
 def turntable(
@@ -40,3 +47,32 @@ def turntable(
     start = home.on_turntable(0.0, np.radians(tilt), axis) if tilt else home
     steps = count if degrees % 360 == 0 else max(count - 1, 1)
     return [start.turned(axis, np.radians(degrees) * number / steps) for number in range(count)]
+
+
+def far_enough(
+    home: Camera, way: Callable[[Camera], Sequence[Camera]], corners: np.ndarray, size: tuple[int, int]
+) -> list[Camera]:
+    """The cameras of a way, begun so far away from the home's pivot that all of them show all corners.
+
+    Parameters
+    ----------
+    way
+        The cameras, of the first one.
+    corners
+        (n, 3) world; they do not surround a camera however far away.
+    size
+        Width and height of the frames, pixels.
+    """
+    cameras = list(way(home))
+    while not all(_shows(camera, corners, size) for camera in cameras):
+        home = home.zoomed(_STEP_BACK)
+        cameras = list(way(home))
+    return cameras
+
+
+def _shows(camera: Camera, corners: np.ndarray, size: tuple[int, int]) -> bool:
+    pixels = psw.View.through_wall(camera.position, camera.wall(size)).project(corners)
+    margin = _MARGIN * min(size)
+    return bool(
+        ((pixels >= margin) & (pixels <= np.array(size) - margin)).all()
+    )  # not NaN, behind the camera
