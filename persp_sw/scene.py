@@ -240,7 +240,7 @@ class Scene:
                 f"the volume {self._volume.name or 'of this scene'} is only in memory: write it to a file, "
                 "then make the scene with Scene.of_file"
             )
-        keys = self.keys.model_dump(mode="json", exclude_unset=True)
+        keys = self.keys.model_dump(mode="json", exclude_unset=True, exclude_none=True)
         keys["volume"] = os.path.relpath(self._path(self.keys.volume), path.parent)
         if isinstance(self.keys.tf, str) and self.keys.tf not in presets.NAMES:
             keys["tf"] = os.path.relpath(self._path(self.keys.tf), path.parent)

@@ -29,7 +29,8 @@ def screenshot(
     """Render what is wanted at any size, without texts, and write it.
 
     The camera's height of view stays, its width follows the size. It is drawn by the software warp, which has
-    no limit of a graphics card's; a picture of 8192 × 8192 pixels takes 1.3 GB while it is made.
+    no limit of a graphics card's; a picture of 8192 × 8192 pixels takes 1.3 GB while it is made, in stereo
+    some 8 GB, for two eyes are combined in float64.
 
     Parameters
     ----------
