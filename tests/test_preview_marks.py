@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from samples import result_of
-from tolerances import FLOAT32_IMAGE, MARK_OPENGL
+from tolerances import FLOAT32_IMAGE, MARK_HALF, MARK_OPENGL
 
 import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
@@ -166,6 +167,7 @@ def test_ctrl_drags_change_window_and_level(opened: tuple, scene: psw.Scene):
     second = drag(48, 0)
     assert second == pytest.approx((first[0], 2 * width))  # a third of the height: 8^(1/3)
     wanted = preview.advance(9.0)
+    assert wanted.eye_images != replace(wanted, window=first).eye_images
     np.testing.assert_array_equal(wanted.camera.pose.matrix, home.pose.matrix)
     assert wanted.marks.cursor is None and "level" in wanted.message
     done = pictures.composite(wanted)
@@ -277,6 +279,46 @@ def test_opengl_draws_the_marks_that_the_processor_draws(
     assert drawn.sum() > 50
     assert np.quantile(error, 0.98) < MARK_OPENGL
     assert error.mean() < MARK_OPENGL / 4
+
+
+@pytest.mark.gl
+@pytest.mark.parametrize("eye", [(70, 40, 60), (-30, 80, 20), (24, 20, 30)])
+def test_each_kind_of_mark_is_what_the_processor_paints(
+    gl_context: psw.OffscreenContext, scene: psw.Scene, eye: tuple
+):
+    """In one picture of float32, with nothing between: only rims of lines and of sheets may differ."""
+    from vr_plugin.preview.mark_shapes import MarkShapes
+    from vr_plugin.screen.eye_target import EyeTarget
+    from vr_plugin.screen.shapes import Shapes
+
+    volume = scene.volume
+    fog = psw.TransferFunction([(0, (0.3, 0.5, 0.9), 0), (200, (1, 0.6, 0.3), 0.05)], 1.0)
+    renderer = psw.Renderer(volume, fog)
+    probe, middle = psw.Probe.of(renderer), volume.centre
+    view = psw.View.look_at(eye, middle + (3, 2, 1), (0, 0, 1), 50, SIZE)
+    image = renderer.render(view)
+    word = m.Label(middle + (-9, 8, -5), "H", (1.0, 0.9, 0.1), (0.0, 0.1, 0.0), letter=30)
+    for marks in (
+        m.bounding_box(volume),
+        m.Marks(labels=[word]),
+        m.Marks(m.cursor(volume, middle, planes=True).sheets),
+        m.cursor(volume, middle),
+    ):
+        veiled = m.veil(marks, view, probe)
+        expected = image.copy()
+        m.paint(expected, view, veiled)
+        target, shapes = EyeTarget(SIZE, "float32"), Shapes()
+        drawn = MarkShapes(shapes)
+        target.upload(image)
+        with target.drawing(clear=False):
+            drawn.draw(veiled, view, SIZE)
+        texture = target.read()
+        for part in (drawn, shapes, target):
+            part.close()
+        error = np.abs(texture - expected).max(-1)
+        assert (np.abs(expected - image).max(-1) > 0.05).any() or eye == (24, 20, 30)
+        assert np.quantile(error, 0.995) < MARK_HALF
+        assert error.mean() < MARK_HALF
 
 
 def frames_of(preview: Preview, pictures: PreviewPictures, texture_frames) -> tuple:

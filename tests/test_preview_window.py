@@ -199,6 +199,39 @@ def test_flights_sessions_and_large_pictures_are_kept(preview: Preview, tmp_path
         assert np.array_equal(np.asarray(picture), psw.images.presented(image))
 
 
+@pytest.mark.parametrize(
+    "preview", [(*STAYS, "--warp", "texture"), (*STAYS, "--warp", "software")], indirect=True
+)
+def test_keys_and_clicks_show_marks_and_pick(preview: Preview):
+    home = preview.until(lambda p: covered(p) > 0.1)
+    for key in ("b", "y", "u", "l"):
+        preview.hand("key", key)
+        marked = preview.until(lambda p: (p != home).any())
+        # Marks stand outside the body, too, where nothing was; and hide little.
+        assert 0.001 < covered(marked) - covered(home) < 0.3, key
+        preview.hand("key", key)
+        preview.until(lambda p: (p == home).all())
+
+    preview.hand("mousemove", 240, 180, "keydown", "ctrl", "click", 1, "keyup", "ctrl")
+    preview.until(lambda p: covered(p[-40:]) > 0.05)  # it says what is there
+    picked = preview.until(lambda p: covered(p[-40:]) < 0.05)  # for a few seconds
+    assert (picked != home).any(-1).sum() > 300
+    # The cursor's arms begin around what was clicked at.
+    assert (picked != home).any(-1)[165:195, 225:255].sum() > 20
+    preview.hand("key", "c", "key", "c")
+    preview.until(lambda p: (p == home).all())
+
+    # Window and level; a preset brings colours back.
+    preview.hand("keydown", "ctrl", "mousemove", 280, 100, "mousedown", 1, "mousemove", 240, 100)
+    preview.hand("mousemove", 200, 100, "mouseup", 1, "keyup", "ctrl")
+    grey = preview.until(lambda p: apart(p, home) > 1 and np.ptp(p, axis=-1).max() <= 1)  # no words, either
+    assert covered(grey) > 0.1
+    preview.hand("key", "period", "key", "comma")
+    preview.until(lambda p: (p == home).all())
+    preview.hand("key", "Escape")
+    preview.leave()
+
+
 def test_flight_and_the_room_from_outside(preview: Preview):
     home = preview.until(lambda p: covered(p) > 0.1)
     preview.hand("key", "f", "keydown", "w", "sleep", 1, "keyup", "w")

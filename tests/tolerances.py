@@ -335,3 +335,5 @@ MARK_INK = 0.65**2 / 8 * 0.8
 # OpenGL beside the processor, sRGB 0 … 1: half floats, and lines' places in float32, which move the rim of a
 # line by some thousandths of a pixel, in linear light as much, of which the dark makes 12.9 times as much.
 MARK_OPENGL = 3 / 255
+# Words are half floats, rounded by 2⁻¹²; a few rims of lines, whose places are float32, move as above.
+MARK_HALF = 2e-3
