@@ -211,7 +211,7 @@ def test_a_legend_has_the_functions_colours():
     np.testing.assert_allclose(middle[:, :3], transfer.colour(legend.values), atol=1e-7)
     np.testing.assert_array_equal(middle[:, 3], 1)
     # The curve is the wider the more opaque.
-    curve = legend.picture[slice(*legend.rows), : legend.columns[0], 0]
+    curve = legend.picture[slice(*legend.rows), : legend.columns[0] - 1, 0]
     ink = (curve > 0.2).sum(1)
     opaque, faint = ink[np.argmin(abs(legend.values - 89))], ink[np.argmin(abs(legend.values - 39))]
     assert opaque > 2 * faint > 0

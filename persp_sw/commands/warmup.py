@@ -76,6 +76,7 @@ def _timed(what: str, work: Any) -> dict[str, Any]:
 def _render(name: str) -> None:
     """One sample an interval and several, one face and several; from inside too."""
     from ..measure.cases import eye_path, transfer_for
+    from ..probe import Probe
     from ..renderer import Renderer
     from ..settings import Settings
     from ..volume.phantoms import synthetic_ct
@@ -90,6 +91,9 @@ def _render(name: str) -> None:
                 renderer.settings = Settings(samples_per_interval=samples)
                 with suppress(ViewError):  # an eye inside, where that is refused, needs no kernel
                     renderer.render(view)
+    probe = Probe.of(renderer)  # marks and picks
+    probe.in_front(view.eye, volume.centre)
+    probe.pick(view, (24.0, 24.0))
 
 
 def _judge() -> None:

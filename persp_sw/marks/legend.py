@@ -84,6 +84,8 @@ def legend(
     top = margin + letter // 2
     rows = slice(top, top + height)
     _draw_curve(picture[rows, margin:left], transfer, values, palette.ink)
+    frame = picture[top - 1 : top + height + 1, left - 1 : left + bar + 1]
+    frame[:] = frame / 2 + np.array([*palette.ink, 1.0]) / 2
     picture[rows, left : left + bar, :3] = transfer.colour(values)[:, None]
     picture[rows, left : left + bar, 3] = 1
 
