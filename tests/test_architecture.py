@@ -52,7 +52,7 @@ VR_RANKS = {
     "cameras": 3, "rigs": 3, "trackers": 3, "present": 3, "window": 3, "host_view": 3,
     "depths": 3, "moment": 3, "pacing": 3,
     "frame": 4, "formats": 4, "room": 4, "rest_watch": 4, "film": 4,
-    "host": 5, "steady": 5,
+    "host": 5, "marks": 5, "steady": 5,
     "loop": 6,
     "shown": 7,
     "beside": 8, "record": 8,

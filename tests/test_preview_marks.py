@@ -12,9 +12,9 @@ from tolerances import FLOAT32_IMAGE, MARK_HALF, MARK_OPENGL
 
 import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
+from vr_plugin.marks.marking import Marking
 from vr_plugin.preview.controller import Preview
 from vr_plugin.preview.figures import Rate
-from vr_plugin.preview.marking import Marking
 from vr_plugin.preview.pictures import PreviewPictures
 from vr_plugin.preview.run import software_frame
 from vr_plugin.preview.session import open_preview, press
@@ -287,7 +287,7 @@ def test_each_kind_of_mark_is_what_the_processor_paints(
     gl_context: psw.OffscreenContext, scene: psw.Scene, eye: tuple
 ):
     """In one picture of float32, with nothing between: only rims of lines and of sheets may differ."""
-    from vr_plugin.preview.mark_shapes import MarkShapes
+    from vr_plugin.marks.shapes import MarkShapes
     from vr_plugin.screen.eye_target import EyeTarget
     from vr_plugin.screen.shapes import Shapes
 

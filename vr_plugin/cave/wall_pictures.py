@@ -9,7 +9,8 @@ import numpy as np
 
 import persp_sw as psw
 
-from ..frame import Frame
+from ..frame import Frame, Picture
+from .wall_marks import WallMarks
 
 WARPS = ("auto", "texture", "software")
 
@@ -39,8 +40,10 @@ class Drawer(Protocol):
         ...
 
 
-def drawer(renderer: psw.Renderer, warp: str) -> Drawer:
-    """The drawer of `WARPS`; auto: OpenGL where a graphics card draws, else software, which is faster there.
+def drawer(renderer: psw.Renderer, warp: str, marks: WallMarks | None = None) -> Drawer:
+    """The drawer of `WARPS`, with marks in its pictures.
+
+    auto: OpenGL where a graphics card draws, else software, which is faster there.
 
     Raises
     ------
@@ -48,16 +51,16 @@ def drawer(renderer: psw.Renderer, warp: str) -> Drawer:
         "texture", and there is no OpenGL.
     """
     if warp == "software":
-        return SoftwareDrawer(renderer)
+        return SoftwareDrawer(renderer, marks)
     try:
-        texture = TextureDrawer()
+        texture = TextureDrawer(marks)
     except psw.PerspSWError:
         if warp == "texture":
             raise
-        return SoftwareDrawer(renderer)
+        return SoftwareDrawer(renderer, marks)
     if warp == "auto" and texture.context.is_software:
         texture.close()
-        return SoftwareDrawer(renderer)
+        return SoftwareDrawer(renderer, marks)
     return texture
 
 
@@ -66,20 +69,24 @@ class SoftwareDrawer:
 
     name = "software"
 
-    def __init__(self, renderer: psw.Renderer):
-        self._renderer = renderer
+    def __init__(self, renderer: psw.Renderer, marks: WallMarks | None = None):
+        self._renderer, self._marks = renderer, marks
         self._canvases: dict[tuple[str, str], psw.Canvas] = {}
 
     def draw(self, frame: Frame) -> Drawn:
         """All pictures of a frame."""
         pictures, spent = {}, {}
+        if self._marks is not None:
+            self._marks.follow()
         for picture in frame.pictures:
             key = picture.wall.name, picture.eye
             start = perf_counter()
             canvas = self._canvases.get(key)
             if canvas is None or canvas.pixels.shape[1::-1] != picture.view.size:
                 canvas = self._canvases[key] = psw.Canvas(*picture.view.size)
-            pictures[key] = self._renderer.warp(picture.image, picture.view, canvas)
+            pictures[key] = _marked(
+                self._renderer.warp(picture.image, picture.view, canvas), picture, self._marks
+            )
             spent[key] = 1e3 * (perf_counter() - start)
         return Drawn(pictures, spent, 0.0)
 
@@ -92,7 +99,8 @@ class TextureDrawer:
 
     name = "texture"
 
-    def __init__(self):
+    def __init__(self, marks: WallMarks | None = None):
+        self._marks = marks
         self.context = psw.OffscreenContext()
         self._warp = psw.TextureWarp()
         self._targets: dict[tuple[int, int], psw.Framebuffer] = {}
@@ -100,6 +108,8 @@ class TextureDrawer:
     def draw(self, frame: Frame) -> Drawn:
         """All pictures of a frame; a picture's time includes reading it back, which ends its drawing."""
         self.context.make_current()
+        if self._marks is not None:
+            self._marks.follow()
         start = perf_counter()
         for eye, image in frame.images.items():
             self._warp.upload(image, eye)
@@ -113,7 +123,7 @@ class TextureDrawer:
             target.clear()
             self._warp.draw_view(picture.view, picture.eye)
             key = picture.wall.name, picture.eye
-            pictures[key] = target.read()
+            pictures[key] = _marked(target.read(), picture, self._marks)
             spent[key] = 1e3 * (perf_counter() - start)
         return Drawn(pictures, spent, upload_ms)
 
@@ -124,3 +134,13 @@ class TextureDrawer:
         for target in self._targets.values():
             target.close()
         self.context.close()
+
+
+def _marked(image: np.ndarray, picture: Picture, marks: WallMarks | None) -> np.ndarray:
+    """A picture with its marks, in a copy: canvases know what was drawn on them."""
+    veiled = None if marks is None else marks.seen(picture)
+    if veiled is None:
+        return image
+    image = image.copy()
+    psw.marks.paint(image, picture.view, veiled)
+    return image

@@ -15,14 +15,17 @@ import persp_sw as psw
 from ..beside import Beside
 from ..frame import Frame, Picture
 from ..loop import Loop
+from ..marks.shapes import MarkShapes
 from ..present import Composer
 from ..record import FrameClock, record_of
 from ..screen.events import Event, Key, asks_to_end
 from ..screen.eye_target import EyeTarget
+from ..screen.shapes import Shapes
 from ..shown import InTurn, Source
 from ..trackers import MouseTracker
 from ..window import Window, Windows
 from .tracker_events import TrackerEvents
+from .wall_marks import WallMarks
 
 QUALITY_STEP = 2**0.25
 _PATIENCE_S = 0.002
@@ -41,21 +44,32 @@ class WallWindow:
             self.rig_wall.name, self.rig_wall.window, pixels, quad_buffered=quad
         )
         self.composer = Composer()
+        self.shapes = Shapes()
+        self.marks = MarkShapes(self.shapes)
         self.targets = {}
 
     def draw(
-        self, pictures: Sequence[Picture], channels: Sequence[str], mode: str, warp: Any, background: Any
+        self,
+        pictures: Sequence[Picture],
+        channels: Sequence[str],
+        mode: str,
+        warp: Any,
+        background: Any,
+        marks: WallMarks,
     ) -> None:
         """Draw the pictures of this wall into the window, in its mode; not yet shown."""
         self.window.make_current()
-        views = {p.eye: p.view for p in pictures if p.wall.name == self.rig_wall.name}
+        own = {p.eye: p for p in pictures if p.wall.name == self.rig_wall.name}
         for eye in dict.fromkeys(channels):
             target = self.targets.get(eye)
             if target is None:
                 target = self.targets[eye] = EyeTarget(self.rig_wall.wall.pixels)
             with target.drawing():
-                if eye in views:  # none where an eye is in the wall's plane
-                    warp.draw_view(views[eye], eye)
+                if eye in own:  # none where an eye is in the wall's plane
+                    view = own[eye].view
+                    warp.draw_view(view, eye)
+                    if (veiled := marks.seen(own[eye])) is not None:
+                        self.marks.draw(veiled, view, view.size)
         left, right = (self.targets[eye] for eye in channels)
         self.composer.compose(
             left, right, mode, self.window.size, background=background, first_row=self.window.first_row
@@ -67,7 +81,8 @@ class WallWindow:
             self.window.make_current()
             for target in self.targets.values():
                 target.close()
-            self.composer.close()
+            for part in (self.composer, self.marks, self.shapes):
+                part.close()
             self.window.close()
 
 
@@ -82,6 +97,8 @@ class WindowLoop:
         Linear colour behind the volume.
     trace
         Takes a record of each frame.
+    marks
+        On the walls; None: none, until the wand picks.
 
     Attributes
     ----------
@@ -97,7 +114,9 @@ class WindowLoop:
         source: Source,
         background: Sequence[float] = (0, 0, 0),
         trace: psw.TraceWriter | None = None,
+        marks: WallMarks | None = None,
     ):
+        self.marks = marks or WallMarks(loop, psw.marks.MarkChoice(), background)
         self.loop, self.source, self.background, self.trace = loop, source, background, trace
         self.ended = False
         self.records: deque[psw.FrameRecord] = deque(maxlen=_RECORDS)
@@ -177,9 +196,10 @@ class WindowLoop:
             self._uploaded = shown.frame
         clock.append(time.monotonic())
         pictures = shown.pictures
+        self.marks.follow()
         for wall in drawn:
             stereo = shown.frame.moment.stereo[wall.rig_wall.name]
-            wall.draw(pictures, stereo.channels, stereo.shown_mode, warp, self.background)
+            wall.draw(pictures, stereo.channels, stereo.shown_mode, warp, self.background, self.marks)
             if self.timed:
                 wall.composer.finish()
         clock.append(time.monotonic())
@@ -208,6 +228,7 @@ def run_windows(
     *,
     in_turn: bool = False,
     trace: psw.TraceWriter | None = None,
+    marks: WallMarks | None = None,
 ) -> dict[str, Any]:
     """Show a rig until the user ends it; medians of what the last frames cost.
 
@@ -223,7 +244,7 @@ def run_windows(
         raise psw.PerspSWError("windows are drawn by OpenGL: leave --warp software out, or use --offscreen")
     period_s = 1 / loop.rig.quality.target_hz
     source = InTurn(loop, period_s) if in_turn else Beside(loop, period_s)
-    shown = WindowLoop(loop, source, background, trace)
+    shown = WindowLoop(loop, source, background, trace, marks)
     with suppress(KeyboardInterrupt), source:  # Ctrl-C in the terminal ends it as escape does
         shown.run(frames)
     records = list(shown.records)[1 if shown.frames <= _RECORDS else 0 :] or shown.records

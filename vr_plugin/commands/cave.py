@@ -13,6 +13,8 @@ from click.core import ParameterSource
 
 from persp_sw.commands.options import (
     json_option,
+    mark_options,
+    marks_of,
     open_scene,
     say_missing_voxels,
     setting_options,
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     import persp_sw as psw
 
     from ..cave.offscreen import Costs
+    from ..cave.wall_marks import WallMarks
     from ..frame import Frame
     from ..loop import Loop
     from ..rig import Rig
@@ -91,6 +94,7 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
 @click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="Folder for pictures.")
 @tf_option
 @setting_options
+@mark_options
 @volume_options
 @json_option
 def cave(
@@ -123,12 +127,16 @@ def cave(
     """Show SCENE on all walls of RIG, for a tracked viewer, in stereo."""
     import persp_sw as psw
 
+    from ..cave.wall_marks import WallMarks
     from ..formats.opening import open_rig
     from ..loop import Loop
     from ..pacing import controller_for
     from ..rigs.one_machine import rig_on_machine
     from ..trackers import open_tracker
 
+    choice = marks_of(keys)
+    if choice and judge:
+        raise psw.PerspSWError("--reference judges pictures without marks: leave one of the two out")
     chosen = rig_on_machine(open_rig(rig, unit), machine, offscreen=offscreen)
     if recording:
         chosen = replace(chosen, tracker=chosen.tracker_for(recording))
@@ -156,16 +164,19 @@ def cave(
         controller = controller_for(renderer, chosen.quality, rate) if adapts else None
         loop = Loop(chosen, renderer, tracker, controller)
         try:
+            marks = WallMarks(loop, choice, shown.background)
             with _trace(trace_file, chosen, scene, rate, settings) as trace:
                 if not offscreen:
                     from ..cave.windows import run_windows
 
                     progress(1, 1, "starting")
-                    values = run_windows(loop, warp, shown.background, frames, in_turn=in_turn, trace=trace)
+                    values = run_windows(
+                        loop, warp, shown.background, frames, in_turn=in_turn, trace=trace, marks=marks
+                    )
                 else:
                     values = _offscreen(
                         loop, chosen, warp, frames or 10, rate, start, every,
-                        separate, judge, folder, Path(scene).stem, shown.background, trace, progress,
+                        separate, judge, folder, Path(scene).stem, shown.background, trace, marks, progress,
                     )  # fmt: skip
         finally:
             loop.close()
@@ -203,6 +214,7 @@ def _offscreen(
     name: str,
     background: Sequence[float],
     trace: psw.TraceWriter | None,
+    marks: WallMarks,
     progress: Any,
 ) -> dict[str, Any]:
     import persp_sw as psw
@@ -222,7 +234,7 @@ def _offscreen(
         if every and number % every == 0:
             write(drawn.pictures, number)
 
-    chosen = drawer(loop.renderer, warp)
+    chosen = drawer(loop.renderer, warp, marks)
     try:
         costs, frame, drawn = cave_offscreen.run_offscreen(
             loop, chosen, frames, rate_hz=rate_hz, start_s=start_s, separate=separate, each=each,

@@ -17,13 +17,13 @@ import persp_sw as psw
 from ..cameras import Camera
 from ..eyes import eyes_of_head
 from ..film.flight import Flight
+from ..marks.marking import Marking
 from ..pose import Pose, Vector
 from ..rig import STEREO_MODES, Rig
 from ..stereo import in_eyes_picture
 from .choices import SEPARATION, Choices
 from .flights import Flights
 from .keys import BINDINGS, SPIN_KEYS, STEREO_KEYS, THRUST_KEYS
-from .marking import Marking
 from .navigation import STYLES, Navigator
 from .wanted import Wanted
 

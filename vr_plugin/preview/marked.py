@@ -8,58 +8,37 @@ from numpy.typing import NDArray
 import persp_sw as psw
 
 from ..frame import Picture
+from ..marks.shown import ShownMarks
 from ..screen.lettering import lay_over, squeezed
 from .wanted import Wanted
 
 
-class PictureMarks:
-    """What the pictures of a renderer show of a choice of marks.
-
-    Parameters
-    ----------
-    renderer
-        Of the pictures; its transfer function and regions may change.
-    palette
-        Colours of marks.
-    """
+class PictureMarks(ShownMarks):
+    """What the preview's pictures show of marks."""
 
     def __init__(self, renderer: psw.Renderer, palette: psw.marks.Palette):
-        self._renderer, self.palette = renderer, palette
-        self._probe: psw.Probe | None = None
+        super().__init__(renderer, palette)
         self._legend: tuple[object, ...] | None = None
-
-    @property
-    def probe(self) -> psw.Probe:
-        """Of what the renderer shows now."""
-        shown = self._renderer.transfer, self._renderer.regions
-        if self._probe is None or (self._probe.transfer, self._probe.regions) != shown:
-            # Steps of a voxel, not half: marks err by a few steps of the screen, in half the time.
-            step = min(self._renderer.volume.spacing)
-            self._probe = psw.Probe.of(self._renderer, step=step)
-        return self._probe
 
     def veiled(self, wanted: Wanted, picture: Picture) -> psw.marks.Veiled | None:
         """The marks in an eye's picture; None if there are none.
 
         A scale bar is for the window alone: it is as deep as the camera's pivot, for all eyes in one place.
         """
-        if not wanted.marks:
-            return None
-        volume, camera = self._renderer.volume, wanted.camera
-        marks = wanted.marks.in_world(volume, self.palette)
+        bar, camera = None, wanted.camera
         if wanted.marks.scale_bar and not wanted.outside:
             view = psw.View.through_wall(camera.position, camera.wall(wanted.size))
-            unit = psw.marks.unit_of(volume)
-            marks += psw.marks.scale_bar(view, camera.pivot, unit, self.palette)
-        return psw.marks.veil(marks, picture.view, self.probe)
+            unit = psw.marks.unit_of(self.renderer.volume)
+            bar = psw.marks.scale_bar(view, camera.pivot, unit, self.palette)
+        return self.seen(wanted.marks, picture.view, bar)
 
     def legend(self, wanted: Wanted) -> tuple[psw.marks.Legend, tuple[int, int]] | None:
         """The legend and its place in the window, the same object while it is the same; None without."""
         if not wanted.marks.legend or wanted.outside:
             return None
-        key = self._renderer.transfer, wanted.size
+        key = self.renderer.transfer, wanted.size
         if self._legend is None or self._legend[0] != key:
-            made = psw.marks.legend_for(wanted.size, key[0], self._renderer.volume, self.palette)
+            made = psw.marks.legend_for(wanted.size, key[0], self.renderer.volume, self.palette)
             self._legend = key, made
         return self._legend[1]
 

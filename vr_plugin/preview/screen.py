@@ -11,6 +11,7 @@ import numpy as np
 import persp_sw as psw
 
 from ..frame import Picture
+from ..marks.shapes import MarkShapes
 from ..present import Composer, EyeTarget, read_screen
 from ..projection import clip_from_view_space
 from ..room.outside import Colour, Dot, Label, Line, Sheet
@@ -19,7 +20,6 @@ from ..screen.gl_objects import Texture
 from ..screen.lettering import lettered
 from ..screen.shapes import Shapes, clip_from_pixels
 from ..screen.text_overlay import Overlay
-from .mark_shapes import MarkShapes
 from .pictures import Composited, PreviewPictures
 from .wanted import Wanted
 

@@ -12,6 +12,7 @@ from persp_sw.errors import PerspSWError
 
 from ..film.flight import Flight
 from ..formats.opening import open_rig
+from ..marks.marking import Marking
 from ..placement import corners_in_room, room_from_world
 from ..pose import Pose
 from ..rig import Rig
@@ -20,7 +21,6 @@ from ..room.rooms import four_walls
 from .choices import Choices
 from .controller import Preview
 from .keys import KEYS
-from .marking import Marking
 from .pictures import PreviewPictures
 from .saved_view import SavedView
 

@@ -30,6 +30,8 @@ class Bindings:
         direction that it points to (its −z) stays.
     reset
         Puts the volume back and takes the clip plane away.
+    pick
+        Asks for what the hand points at.
     scale_axis, scale_rate
         Grows and shrinks about the hand, by exp(rate · axis) a second.
     turn_axis, turn_rate
@@ -43,6 +45,7 @@ class Bindings:
     grab: int | None = 0
     clip: int | None = 1
     reset: int | None = 2
+    pick: int | None = 3
     scale_axis: int | None = 1
     turn_axis: int | None = 0
     scale_rate: float = 1.0
@@ -74,6 +77,8 @@ class Wand:
         room_from_hand, or None before it was seen.
     grabbed
         Whether the volume hangs on the hand.
+    picks
+        How often a pick has been asked for.
     """
 
     def __init__(
@@ -89,6 +94,7 @@ class Wand:
         self.centre_world = np.array(tuple(centre_world), np.float64)
         self.clip_plane: np.ndarray | None = None
         self.hand: Pose | None = None
+        self.picks = 0
         self._hand_seen = -math.inf
         self._hand_from_world: np.ndarray | None = None
         self._pressed: tuple[bool, ...] = ()
@@ -104,6 +110,16 @@ class Wand:
     def clip_planes(self) -> tuple[np.ndarray, ...]:
         """The planes to clip with, in world: none or one."""
         return () if self.clip_plane is None else (self.clip_plane,)
+
+    @property
+    def ray_in_world(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Where the hand is and where it points to, its −z, in world; None before it was seen."""
+        if self.hand is None:
+            return None
+        world_from_room = np.linalg.inv(self.room_from_world)
+        direction = -rotation_of(self.hand.orientation)[:, 2]
+        origin = world_from_room[:3, :3] @ self.hand.position + world_from_room[:3, 3]
+        return origin, world_from_room[:3, :3] @ direction
 
     def update(self, samples: Iterable[Sample], now: float) -> bool:
         """Take samples in room space, in their order, and let time go on.
@@ -139,6 +155,7 @@ class Wand:
             return
         if self.hand is None:
             return
+        self.picks += self._down(keys.pick, pressed) and not self._down(keys.pick, before)
         if not self._down(keys.grab, pressed):
             self._hand_from_world = None
         elif not self._down(keys.grab, before):

@@ -1,4 +1,4 @@
-"""What the preview's hands do with marks: toggles, picks, distances, window and level."""
+"""What hands do with marks: toggles, picks, distances, window and level."""
 
 from __future__ import annotations
 
@@ -77,7 +77,10 @@ class Marking:
 
     def pick(self, view: psw.View, pixel: tuple[float, float]) -> str:
         """Set the cursor to what is seen at a pixel, and a ruler from the pick before; says what it is."""
-        pick = self._probe().pick(view, pixel) if self._probe is not None else None
+        return self.take(self._probe().pick(view, pixel) if self._probe is not None else None)
+
+    def take(self, pick: psw.Pick | None) -> str:
+        """As `pick`, of what a ray has met."""
         if pick is None:
             return "nothing is solid enough here to be picked"
         before = self._point if self.picked and self.choice.cursor is not None else None
