@@ -14,7 +14,7 @@ import persp_sw as psw
 from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.marks.marking import Marking
 from vr_plugin.preview.controller import Preview
-from vr_plugin.preview.figures import Rate
+from vr_plugin.preview.figures import Rate, figures
 from vr_plugin.preview.pictures import PreviewPictures
 from vr_plugin.preview.run import software_frame
 from vr_plugin.preview.session import open_preview, press
@@ -91,6 +91,16 @@ def test_picks_set_the_cursor_and_tell_the_distance(opened: tuple, scene: psw.Sc
     np.testing.assert_allclose(wanted.marks.ruler, (one.position_world, two.position_world), atol=1e-6)
     apart = np.linalg.norm(two.position_world - one.position_world)
     assert f"distance {m.short(apart)} mm" in wanted.picked
+    figures_ = dict.fromkeys(("composite_ms", "warp_ms", "samples", "quality", "target_hz"), 1.0)
+    figures_ |= {"faces": 1, "compositings": 1, "intermediate_size": (9, 9), "warp": "software", "why": ""}
+    told = figures(wanted, figures_ | {"samples_per_interval": 1, "preintegrated": False}, Rate())
+    assert [line.split()[0] for line in told.splitlines()][-5:] == [
+        "value",
+        "at",
+        "depth",
+        "distance",
+        "help",
+    ]
     pick_at(preview, 2, 2)
     wanted = preview.advance(0.2)
     assert "nothing" in wanted.message

@@ -18,8 +18,10 @@ _BEYOND = 0.06  # of the longest edge: how far letters stand off the box
 _GAP = 0.03  # of the longest edge: half of what is left open around a cursor's point
 _OPPOSITE = dict(zip("LRAPSI", "RLPAIS", strict=True))
 _BAR = 0.2  # of the picture's width: how long a scale bar is at most
-_MARGIN = 0.035  # of the picture's height, around a scale bar
+_MARGIN = 0.035  # of the picture's height, beside a scale bar
+_BELOW = 0.09  # and below it, where words may stand
 _TICK = 0.008
+_SHINE = 0.7  # opacity of a ruler through what hides it
 
 
 def unit_of(volume: Volume) -> str:
@@ -115,7 +117,7 @@ def ruler(start: Vector, end: Vector, unit: str, palette: Palette = _LIGHT) -> M
     """A line between two points and its length; it shines through what hides it, for it often lies inside."""
     start, end = vector(start, "a ruler's start", ViewError), vector(end, "a ruler's end", ViewError)
     text = length_text(float(np.linalg.norm(end - start)), unit)
-    lines = [Line(start, end, palette.ruler, 2.0, 0.4, veiled=False), Line(start, end, palette.ruler, 2.0)]
+    lines = [Line(start, end, palette.ruler, 2.0, _SHINE, veiled=False), Line(start, end, palette.ruler, 2.0)]
     label = Label((start + end) / 2, text, palette.ruler, palette.halo, (0, -14), veiled=False)
     return Marks(lines=lines, labels=[label])
 
@@ -150,8 +152,7 @@ def scale_bar(view: View, at: Vector, unit: str, palette: Palette = _LIGHT) -> M
             return view.wall.world_from_pixel @ (column, row, 1.0)
         return view.eye.position + w * (view.direction_from_pixel @ (column, row, 1.0))
 
-    margin = _MARGIN * height
-    left, row = margin, height - margin
+    left, row = _MARGIN * height, (1 - _BELOW) * height
     pixel = float(np.linalg.norm(place(left + 1, row) - place(left, row)))
     length = round_length(_BAR * width * pixel)
     right = left + length / pixel

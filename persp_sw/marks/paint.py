@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ..arrays import Image, Points
 from ..geometry.view import View
 from .lettering import lettered
-from .shapes import Label, Marks
+from .shapes import Colour, Label, Marks
 from .veil import NEAREST, Veiled, VeiledLabel, VeiledLine, VeiledSheet, veil
 
 if TYPE_CHECKING:
@@ -60,13 +61,19 @@ def paint(image: Image, view: View, veiled: Veiled, squeeze: tuple[int, int] = (
 
 def label_picture(label: Label) -> NDArray[np.float32]:
     """A word with its rim: (h, w, 4) float32, linear, premultiplied; of even size, to be halved."""
-    ink = lettered(label.text, label.letter)
+    return _word(label.text, label.letter, tuple(label.colour), tuple(label.halo))
+
+
+@lru_cache(maxsize=64)
+def _word(text: str, letter: int, colour: Colour, halo: Colour) -> NDArray[np.float32]:
+    ink = lettered(text, letter)
     ink = np.pad(ink, [(1, 1 + n % 2) for n in ink.shape])
     rim = np.max([np.roll(ink, (m, n), (0, 1)) for m in (-1, 0, 1) for n in (-1, 0, 1)], 0)
     rim = (1 - ink) * rim * np.float32(_HALO)
-    rgb = ink[..., None] * np.array(label.colour, np.float32)
-    rgb = rgb + rim[..., None] * np.array(label.halo, np.float32)
-    return np.concatenate([rgb, (ink + rim)[..., None]], -1).astype(np.float32)
+    rgb = ink[..., None] * np.array(colour, np.float32) + rim[..., None] * np.array(halo, np.float32)
+    picture = np.concatenate([rgb, (ink + rim)[..., None]], -1).astype(np.float32)
+    picture.setflags(write=False)
+    return picture
 
 
 def lay_over(picture: Image, panel: Image, x: int, y: int) -> None:

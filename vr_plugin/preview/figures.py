@@ -79,8 +79,8 @@ def figures(wanted: Wanted, statistics: Mapping[str, Any], rate: Rate) -> str:
         "preset": wanted.preset or "the scene's own",
         "camera": camera,
     }
-    if wanted.picked:
-        lines["picked"] = wanted.picked
+    if wanted.picked:  # value, at, depth, distance
+        lines |= dict(part.split(" ", 1) for part in wanted.picked.split(", "))
     if wanted.outside:
         x, y, z = wanted.head.position
         moved = {None: "by keys", True: "recorded", False: "recorded, halted"}[wanted.path_runs]
