@@ -7,22 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from panel_scene import SIZE, TRANSFER, scene
+
 import persp_sw as psw
-from persp_sw.volume.phantoms import synthetic_ct
 from vr_plugin.panel.frontend import Panel
 from vr_plugin.preview.in_window import run_window
 from vr_plugin.preview.session import open_preview
-
-SIZE = (800, 580)  # two of them fit on the virtual screen, one below the other
-TRANSFER = psw.TransferFunction(
-    [(30.0, (0.2, 0.1, 0.4), 0.0), (80.0, (0.1, 0.6, 0.3), 0.05), (160.0, (0.9, 0.7, 0.2), 0.4)], 1.0
-)
-
-
-def scene(transfer: psw.TransferFunction = TRANSFER) -> psw.Scene:
-    """What every program shows, of whatever transfer function."""
-    rows = transfer.to_dict()["tf"]
-    return psw.Scene.of_volume(synthetic_ct(32), size=SIZE, tf=rows, opacity_unit=transfer.opacity_unit)
 
 
 class Telling(Panel):

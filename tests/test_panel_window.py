@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from panel_program import SIZE, TRANSFER
+from panel_scene import SIZE, TRANSFER
 from samples import ROOT
 from tolerances import FLOAT32_PIXELS
 from virtual_screen import SECONDS, Program, display, environment  # noqa: F401  (a fixture)

@@ -177,7 +177,7 @@ def test_ctrl_drags_change_window_and_level(opened: tuple, scene: psw.Scene):
     second = drag(48, 0)
     assert second == pytest.approx((first[0], 2 * width))  # a third of the height: 8^(1/3)
     wanted = preview.advance(9.0)
-    assert wanted.eye_images != replace(wanted, window=first).eye_images
+    assert wanted.eye_images != replace(wanted, edits=replace(wanted.edits, transfer=None)).eye_images
     np.testing.assert_array_equal(wanted.camera.pose.matrix, home.pose.matrix)
     assert wanted.marks.cursor is None and "level" in wanted.message
     done = pictures.composite(wanted)
