@@ -14,9 +14,13 @@ from .errors import SettingsError, ViewError
 from .geometry.parts import shown_parts
 from .geometry.regions import Regions
 from .geometry.view import Eye, View
+from .kernels import march
 from .kernels.march import composite_rays, hit_rays
-from .optics.classification import Classification
+from .optics.classification2d import classify
+from .optics.look import Look, Modulation
 from .optics.transfer import TransferFunction
+from .optics.transfer2d import TransferFunction2D
+from .volume.gradient import largest_magnitude, world_from_differences
 from .volume.grid import Volume
 from .volume.lift import lift_exponent
 
@@ -65,8 +69,9 @@ class Probe:
 
     Parameters
     ----------
-    volume, transfer, regions
-        What is shown. The transfer function without a unit has that of the volume's smallest spacing.
+    volume, transfer, regions, look
+        What is shown; of the look, modulation by the gradient counts, light does not. A transfer function
+        without a unit has that of the volume's smallest spacing.
     step
         Longest piece that rays are cut into, world units, > 0; None: half the smallest spacing.
     residual
@@ -88,14 +93,16 @@ class Probe:
     def __init__(
         self,
         volume: Volume,
-        transfer: TransferFunction,
+        transfer: TransferFunction | TransferFunction2D,
         regions: Regions | None = None,
+        look: Look | None = None,
         *,
         step: float | None = None,
         residual: float = _RESIDUAL,
         threads: int | None = None,
     ):
         self.volume, self.transfer, self.regions = volume, transfer, regions or Regions()
+        self.look = look or Look()
         self.step = _STEP * min(volume.spacing)
         if step is not None:
             self.step = number(step, "a probe's step", SettingsError, 1e-6 * self.step)
@@ -103,10 +110,14 @@ class Probe:
         self.threads = int(
             number(threads or _jit.max_threads(), "threads", SettingsError, 1, _jit.max_threads())
         )
-        classification, lift = Classification.of(transfer, volume), lift_exponent(volume)
-        rows = classification.table[1:].astype(np.float64)
-        rows[:, :3] *= rows[:, 3:]
-        self._sums = np.concatenate([np.zeros((1, 4)), np.cumsum(rows, 0)])
+        classification, lift = classify(transfer, volume), lift_exponent(volume)
+        rows = classification.rows.astype(np.float64).reshape(classification.magnitudes, -1, 4)[:, 1:]
+        rows[..., :3] *= rows[..., 3:]
+        self._sums = np.concatenate([np.zeros((len(rows), 1, 4)), np.cumsum(rows, 1)], 1)
+        self._gradient = _gradient_of(volume, self.look)
+        self._gradient[march.PER_MAGNITUDE] = np.ldexp(classification.per_magnitude, lift)
+        if classification.magnitudes > 1:
+            self._gradient[march.REACH] = self.look.gradient_distance
         self._origin = float(np.ldexp(classification.origin, -lift))
         self._scale = float(np.ldexp(classification.scale, lift))
         self._object_from_world = np.linalg.inv(volume.world_from_object)
@@ -114,7 +125,7 @@ class Probe:
     @classmethod
     def of(cls, renderer: Renderer, **options: float | None) -> Probe:
         """That of what a renderer shows now; `options` as for the class."""
-        return cls(renderer.volume, renderer.transfer, renderer.regions, **options)
+        return cls(renderer.volume, renderer.transfer, renderer.regions, renderer.look, **options)
 
     def in_front(self, eye: Eye, points: ArrayLike) -> NDArray[np.float64]:
         """What an eye sees in front of points.
@@ -156,6 +167,7 @@ class Probe:
             self._sums,
             self._origin,
             self._scale,
+            self._gradient,
             rows,
             ends,
             rays,
@@ -231,6 +243,7 @@ class Probe:
             self._sums,
             self._origin,
             self._scale,
+            self._gradient,
             rows,
             ends,
             rays,
@@ -261,3 +274,17 @@ class Probe:
         rays[:, 3:6] = directions @ self._object_from_world[:3, :3].T
         rays[:, 6], rays[:, 7] = near, far
         return rays
+
+
+def _gradient_of(volume: Volume, look: Look) -> NDArray[np.float64]:
+    """What kernels need of gradients; no reach where the look does not ask for any."""
+    numbers = np.zeros(march.GRADIENT)
+    numbers[:9] = world_from_differences(volume).ravel()
+    modulation = look.modulation or Modulation(opacity=0, colour=0)
+    largest = largest_magnitude(volume, look.gradient_distance)
+    if largest > 0:
+        numbers[march.LOW] = modulation.low * largest
+        numbers[march.PER_WEIGHT] = 1 / ((modulation.high - modulation.low) * largest)
+    numbers[march.THICKENED], numbers[march.COLOURED] = modulation.opacity, modulation.colour
+    numbers[march.REACH] = 0.0 if look.modulation is None else look.gradient_distance
+    return numbers

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -170,14 +169,15 @@ def test_ctrl_drags_change_window_and_level(opened: tuple, scene: psw.Scene):
         preview.button("left", False, control=True)
         return preview.advance(0.0).window
 
-    home = preview.advance(0.0).camera
+    before = preview.advance(0.0)
+    home = before.camera
     level, width = psw.window_of(scene.transfer)
     first = drag(0, -36)  # a quarter of the height upwards
     assert first == pytest.approx((level + width / 4, width))
     second = drag(48, 0)
     assert second == pytest.approx((first[0], 2 * width))  # a third of the height: 8^(1/3)
     wanted = preview.advance(9.0)
-    assert wanted.eye_images != replace(wanted, edits=replace(wanted.edits, transfer=None)).eye_images
+    assert wanted.eye_images != before.eye_images
     np.testing.assert_array_equal(wanted.camera.pose.matrix, home.pose.matrix)
     assert wanted.marks.cursor is None and "level" in wanted.message
     done = pictures.composite(wanted)
@@ -356,3 +356,21 @@ def psw_image(path: str):
     from PIL import Image
 
     return Image.open(path)
+
+
+def test_two_dimensional_functions_have_marks_but_no_legend(scene: psw.Scene):
+    function = psw.TransferFunction2D([psw.Box((60, 255), (2, 90), (0.9, 0.5, 0.2), 0.6)], 1.0)
+    preview, pictures = open_preview(scene, psw.Settings(), size=SIZE)
+    pictures.renderer.transfer = function
+    press(preview, "L")
+    wanted = preview.advance(0.0)
+    assert pictures.marks.legend(wanted) is None
+    picture = pictures.renderer.render(scene.view(0))
+    choice = m.MarkChoice(box=True, legend=True)
+    with_box = m.with_marks(picture, pictures.renderer, scene.view(0), choice)
+    without = m.with_marks(picture, pictures.renderer, scene.view(0), m.MarkChoice(box=True))
+    np.testing.assert_array_equal(with_box, without)
+    assert (with_box != picture).any()
+    marking = Marking(volume=scene.volume, transfer=lambda: function)
+    low, high = scene.volume.value_range
+    assert marking.window_after(None, 0, 0) == pytest.approx(((low + high) / 2, high - low))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from tolerances import (
     PROBE_EDGES,
+    PROBE_GRADIENTS,
     PROBE_PIECES,
     PROBE_SMOOTH,
     PROBE_SURFACE,
@@ -17,7 +18,7 @@ from views import DIRECTIONS, random_pose
 
 import persp_sw as psw
 from persp_sw.errors import SettingsError, ViewError
-from persp_sw.kernels.march import composite_rays, hit_rays
+from persp_sw.kernels.march import GRADIENT, composite_rays, hit_rays
 from persp_sw.probe import Probe
 from persp_sw.volume.phantoms import constant, linear, paraboloid, synthetic_ct
 
@@ -88,7 +89,9 @@ def test_composited_rays_are_plain_numpys(rng: np.random.Generator, dtype: type)
     rays[:, 3:6] = rng.uniform(0.1, 1, (50, 3))
     rays[:, 6], rays[:, 7] = 0.3, rng.uniform(1, 12, 50)
     ends, out = np.cumsum([len(part) for part in parts]), np.empty((50, 4))
-    composite_rays(voxels, sums, 30.0, 0.2, np.concatenate(parts), ends, rays, 0.4, 0.0, out)
+    composite_rays(
+        voxels, sums[None], 30.0, 0.2, np.zeros(GRADIENT), np.concatenate(parts), ends, rays, 0.4, 0.0, out
+    )
     seen = 0
     for ray, ours in zip(rays, out, strict=True):
         colour, clear = np.zeros(3), 1.0
@@ -111,7 +114,7 @@ def test_hits_are_where_plain_numpy_reaches_the_threshold(rng: np.random.Generat
     rays[:, :3], rays[:, 6:] = rng.uniform(-3, 1, (50, 3)), (0, np.inf)
     rays[:, 3:6] = rng.uniform(0.1, 1, (50, 3))
     out = np.empty((50, 3))
-    hit_rays(voxels, sums, 30.0, 0.2, part, np.array([6]), rays, 0.4, 0.6, out)
+    hit_rays(voxels, sums[None], 30.0, 0.2, np.zeros(GRADIENT), part, np.array([6]), rays, 0.4, 0.6, out)
     found = ~np.isnan(out[:, 0])
     assert 20 < found.sum() < 50
     for ray, (distance, value, opacity) in zip(rays, out, strict=True):
@@ -363,3 +366,49 @@ def test_parts_are_met_front_to_back_from_infinity_too(side: int):
     np.testing.assert_allclose(seen[:2], (0, 1) if side > 0 else (1, 0), atol=probe.residual)
     view = psw.View.parallel((5, 5, -94.5 + side), (5, 5, -94.5), (0, 1, 0), 10, (4, 4))
     assert probe.pick(view, (2, 2)).value == (20 if side > 0 else 10)
+
+
+BOX = psw.TransferFunction2D([psw.Box((60, 180), (3, 30), (0.9, 0.5, 0.2), 0.4, 1.0)], 1.0)
+STRONG = psw.Look(modulation=psw.Modulation(0.02, 0.2, 0.9, 0.6))
+
+
+@pytest.mark.parametrize(
+    ("transfer", "look"),
+    [
+        (BOX, psw.Look()),
+        (SMOOTH, STRONG),
+        (BOX, psw.Look(modulation=psw.Modulation(0.0, 0.15), gradient_distance=2.0)),
+    ],
+)
+def test_what_depends_on_gradients_does_so_in_front_of_points_too(transfer, look: psw.Look):
+    """Against the reference cut at the point, in a smooth volume of skew and unequal axes."""
+    z, y, x = np.indices((20, 20, 20))
+    data = 100 + 90 * np.sin(x / 4) * np.cos(y / 5) * np.sin(z / 6 + 1)
+    pose = np.array([[1, 0.2, 0, 3], [0, 1.3, 0.1, -4], [0, 0, 0.8, 5], [0, 0, 0, 1.0]])
+    volume = psw.Volume(data.astype(np.float32), world_from_object=pose)
+    probe = Probe(volume, transfer, None, look, residual=0)
+    plain = Probe(volume, transfer if transfer is BOX else SMOOTH, residual=0)
+    different = 0.0
+    for towards in DIRECTIONS[:4]:
+        eye = volume.centre + 40 * towards
+        for point in volume.centre + np.array([(2, -3, 1), -30 * towards]):
+            way = (point - eye) / np.linalg.norm(point - eye)
+            view = psw.View.look_at(eye, point, np.eye(3)[np.argmin(np.abs(way))], 1.0, (1, 1))
+            before = psw.Regions(clip=[(*-way, way @ point)])
+            truth = psw.reference.render(volume, transfer, view, regions=before, look=look, tolerance=1e-4)
+            found = probe.in_front(view.eye, point)
+            np.testing.assert_allclose(found, truth[0, 0], atol=PROBE_GRADIENTS)
+            different = max(different, np.abs(found - plain.in_front(view.eye, point)).max())
+            pick = probe.first_hit(eye, way, threshold=0.3)
+            if pick is not None:
+                cut = psw.Regions(clip=[(*-way, way @ pick.position_world)])
+                at = psw.reference.render(volume, transfer, view, regions=cut, look=look, tolerance=1e-4)
+                assert at[0, 0, 3] == pytest.approx(0.3, abs=PROBE_GRADIENTS)
+    assert different > 0.1 or look.is_plain
+
+
+def test_a_renderers_probe_has_its_look():
+    renderer = psw.Renderer(constant((8, 8, 8), 150.0), SMOOTH, look=STRONG)
+    assert psw.Probe.of(renderer).in_front(psw.Eye((4, 4, -5)), (4, 4, 20))[3] < 0.2
+    renderer.look = None
+    assert psw.Probe.of(renderer).in_front(psw.Eye((4, 4, -5)), (4, 4, 20))[3] > 0.7

@@ -50,7 +50,7 @@ def pick(scene: str, x: int, y: int, threshold: float, as_json: bool, **keys: An
         from ..marks import position_text, unit_of
         from ..probe import Probe
 
-        probe = Probe(volume, chosen.transfer, chosen.regions)
+        probe = Probe(volume, chosen.transfer, chosen.regions, chosen.look)
         found = probe.pick(view, (x + 0.5, y + 0.5), threshold)
     values: dict[str, Any] = {"name": chosen.name, "pixel": [x, y], "size": [width, height]}
     values |= {"threshold": threshold, "hit": found is not None, "unit": unit_of(volume)}

@@ -13,6 +13,8 @@ from .._jit import kernel, parallel_kernel, prange
 # Columns of `sums`, and of a ray.
 _EXTINCTION = 3
 _NEAR, _FAR = 6, 7
+# Of `gradient`, after the nine numbers of world_from_differences.
+REACH, PER_MAGNITUDE, LOW, PER_WEIGHT, THICKENED, COLOURED, GRADIENT = 9, 10, 11, 12, 13, 14, 15
 # A hit is looked for again in pieces so many times shorter.
 FINER = 16
 # Table entries. Between values nearer than this, the difference of two sums has no digits left.
@@ -20,12 +22,10 @@ _ALIKE = 1e-6
 
 
 @kernel
-def _value_at(voxels, ray, distance):
-    """The trilinear value at a distance along a ray; NaN where a voxel around it has none."""
+def _value(voxels, x, y, z):
+    """The trilinear value at a place, clamped to the box; NaN where a voxel around it has none."""
     n_z, n_y, n_x = voxels.shape
-    x = min(max(ray[0] + distance * ray[3], 0.0), n_x - 1.0)
-    y = min(max(ray[1] + distance * ray[4], 0.0), n_y - 1.0)
-    z = min(max(ray[2] + distance * ray[5], 0.0), n_z - 1.0)
+    x, y, z = min(max(x, 0.0), n_x - 1.0), min(max(y, 0.0), n_y - 1.0), min(max(z, 0.0), n_z - 1.0)
     i, j, k = min(int(x), n_x - 2), min(int(y), n_y - 2), min(int(z), n_z - 2)
     x, y, z = x - i, y - j, z - k
     near = (1 - y) * ((1 - x) * np.float64(voxels[k, j, i]) + x * np.float64(voxels[k, j, i + 1])) + y * (
@@ -35,6 +35,60 @@ def _value_at(voxels, ray, distance):
         (1 - x) * np.float64(voxels[k + 1, j, i]) + x * np.float64(voxels[k + 1, j, i + 1])
     ) + y * ((1 - x) * np.float64(voxels[k + 1, j + 1, i]) + x * np.float64(voxels[k + 1, j + 1, i + 1]))
     return (1 - z) * near + z * far
+
+
+@kernel
+def _value_at(voxels, ray, distance):
+    """The value at a distance along a ray."""
+    return _value(voxels, ray[0] + distance * ray[3], ray[1] + distance * ray[4], ray[2] + distance * ray[5])
+
+
+@kernel
+def _slope(voxels, x, y, z, axis, reach):
+    """Difference of the values `reach` to both sides along an axis, both in the box, by what lies between."""
+    last = voxels.shape[2 - axis] - 1.0
+    here = x if axis == 0 else y if axis == 1 else z
+    here = min(max(here, 0.0), last)
+    below, above = max(here - reach, 0.0), min(here + reach, last)
+    if axis == 0:
+        rise = _value(voxels, above, y, z) - _value(voxels, below, y, z)
+    elif axis == 1:
+        rise = _value(voxels, x, above, z) - _value(voxels, x, below, z)
+    else:
+        rise = _value(voxels, x, y, above) - _value(voxels, x, y, below)
+    return rise / (above - below)
+
+
+@kernel
+def _magnitude(voxels, ray, distance, gradient):
+    """Length of the gradient at a distance along a ray, per world unit; 0 where a value is missing."""
+    x, y, z = ray[0] + distance * ray[3], ray[1] + distance * ray[4], ray[2] + distance * ray[5]
+    reach = gradient[REACH]
+    a = _slope(voxels, x, y, z, 0, reach)
+    b = _slope(voxels, x, y, z, 1, reach)
+    c = _slope(voxels, x, y, z, 2, reach)
+    total = 0.0
+    for n in range(3):
+        part = gradient[3 * n] * a + gradient[3 * n + 1] * b + gradient[3 * n + 2] * c
+        total += part * part
+    return np.sqrt(total) if total == total else 0.0
+
+
+@kernel
+def _piece(voxels, ray, sums, gradient, middle, here, there, mean):
+    """mean[0 … 3]: extinction · colour and extinction of a piece of a ray between two places in the table."""
+    table, thickened, coloured = 0, 1.0, 1.0
+    if gradient[REACH] > 0:
+        magnitude = _magnitude(voxels, ray, middle, gradient)
+        table = min(int(magnitude * gradient[PER_MAGNITUDE] + 0.5), sums.shape[0] - 1)
+        weight = min(max((magnitude - gradient[LOW]) * gradient[PER_WEIGHT], 0.0), 1.0)
+        thickened = 1 - gradient[THICKENED] + gradient[THICKENED] * weight
+        coloured = 1 - gradient[COLOURED] + gradient[COLOURED] * weight
+    extinction = thickened * max(_mean(sums[table], _EXTINCTION, here, there), 0.0)
+    mean[_EXTINCTION] = extinction
+    if extinction > 0:
+        for n in range(3):
+            mean[n] = thickened * coloured * _mean(sums[table], n, here, there)
 
 
 @kernel
@@ -72,7 +126,7 @@ def _part_of(ray, rows, first, end):
 
 
 @parallel_kernel
-def composite_rays(voxels, sums, origin, scale, rows, ends, rays, step, residual, out):
+def composite_rays(voxels, sums, origin, scale, gradient, rows, ends, rays, step, residual, out):
     """Colour and opacity from the beginning of each ray to its end.
 
     Parameters
@@ -80,8 +134,13 @@ def composite_rays(voxels, sums, origin, scale, rows, ends, rays, step, residual
     voxels
         [z, y, x], at least two along each axis.
     sums
-        (n + 1, 4) float64, cumulative over the table's rows from its second on: extinction times colour, and
-        extinction. Value v lies (v − origin)·scale + ½ rows from the beginning.
+        (m, n + 1, 4) float64, of each magnitude that is told apart: cumulative over the table's rows from its
+        second on, extinction times colour, and extinction. Value v lies (v − origin)·scale + ½ rows from the
+        beginning.
+    gradient
+        (GRADIENT,) float64: the gradient in the world of slopes along the voxel axes (nine numbers, row by
+        row), and voxels to its neighbours, 0 where nothing asks for it; magnitudes told apart a unit;
+        modulation as `Modulation` has it: low, 1 / (high − low), of opacity, of colour.
     rows, ends
         Half-spaces (m, 4) of convex parts, front to back as seen by every ray; part n has those from
         ends[n − 1] on up to ends[n].
@@ -96,7 +155,7 @@ def composite_rays(voxels, sums, origin, scale, rows, ends, rays, step, residual
         (r, 4) float64: premultiplied colour and opacity; overwritten.
     """
     for r in prange(rays.shape[0]):
-        ray = rays[r]
+        ray, mean = rays[r], np.zeros(4)
         red = green = blue = 0.0
         clear = 1.0
         first = 0
@@ -111,13 +170,13 @@ def composite_rays(voxels, sums, origin, scale, rows, ends, rays, step, residual
             for n in range(count):
                 there = (_value_at(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
                 if here == here and there == there:
-                    extinction = _mean(sums, _EXTINCTION, here, there)
-                    if extinction > 0:
-                        through = np.exp(-extinction * length)
-                        share = clear * (1 - through) / extinction
-                        red += share * _mean(sums, 0, here, there)
-                        green += share * _mean(sums, 1, here, there)
-                        blue += share * _mean(sums, 2, here, there)
+                    _piece(voxels, ray, sums, gradient, near + (n + 0.5) * length, here, there, mean)
+                    if mean[_EXTINCTION] > 0:
+                        through = np.exp(-mean[_EXTINCTION] * length)
+                        share = clear * (1 - through) / mean[_EXTINCTION]
+                        red += share * mean[0]
+                        green += share * mean[1]
+                        blue += share * mean[2]
                         clear *= through
                         if clear <= residual:
                             break
@@ -126,7 +185,7 @@ def composite_rays(voxels, sums, origin, scale, rows, ends, rays, step, residual
 
 
 @parallel_kernel
-def hit_rays(voxels, sums, origin, scale, rows, ends, rays, step, threshold, out):
+def hit_rays(voxels, sums, origin, scale, gradient, rows, ends, rays, step, threshold, out):
     """Where each ray's opacity first reaches a threshold.
 
     Parameters
@@ -140,7 +199,7 @@ def hit_rays(voxels, sums, origin, scale, rows, ends, rays, step, threshold, out
     """
     enough = 1 - threshold
     for r in prange(rays.shape[0]):
-        ray = rays[r]
+        ray, mean = rays[r], np.zeros(4)
         out[r, 0] = out[r, 1] = out[r, 2] = np.nan
         clear = 1.0
         first = 0
@@ -155,7 +214,8 @@ def hit_rays(voxels, sums, origin, scale, rows, ends, rays, step, threshold, out
             here = (_value_at(voxels, ray, near) - origin) * scale + 0.5
             for n in range(count):
                 there = (_value_at(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
-                after = clear * _through(sums, here, there, length)
+                begin = near + n * length
+                after = clear * _through(voxels, ray, sums, gradient, begin, length, here, there, mean)
                 if after <= enough:
                     # A sample behind a surface tells only that it lies in this piece or the one before.
                     start = max(n - 1, 0)
@@ -167,7 +227,8 @@ def hit_rays(voxels, sums, origin, scale, rows, ends, rays, step, threshold, out
                         if m == (n - start) * FINER:
                             clear = after
                         end = (_value_at(voxels, ray, begin + (m + 1) * fine) - origin) * scale + 0.5
-                        through = _through(sums, one, end, fine)
+                        at = begin + m * fine
+                        through = _through(voxels, ray, sums, gradient, at, fine, one, end, mean)
                         if after * through <= enough:
                             part_of_it = np.log(after / enough) / -np.log(through) if through > 0 else 0.0
                             distance = begin + (m + part_of_it) * fine
@@ -184,8 +245,9 @@ def hit_rays(voxels, sums, origin, scale, rows, ends, rays, step, threshold, out
 
 
 @kernel
-def _through(sums, here, there, length):
+def _through(voxels, ray, sums, gradient, begin, length, here, there, mean):
     """Transparency of a piece of a ray."""
     if here == here and there == there:
-        return np.exp(-max(_mean(sums, _EXTINCTION, here, there), 0.0) * length)
+        _piece(voxels, ray, sums, gradient, begin + 0.5 * length, here, there, mean)
+        return np.exp(-mean[_EXTINCTION] * length)
     return 1.0

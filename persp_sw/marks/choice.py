@@ -39,7 +39,8 @@ class MarkChoice:
     Attributes
     ----------
     box, axes, scale_bar, legend
-        Whether. Axes come with a patient's letters; the legend is no mark in the world, see `legend`.
+        Whether. Axes come with a patient's letters. The legend, see `legend`, is no mark in the world; there
+        is none of two-dimensional functions.
     cursor
         World xyz of the 3D cursor; None: there is none.
     planes
@@ -119,7 +120,7 @@ def with_marks(
     palette, volume = Palette.over(background), renderer.volume
     marks = choice.of_view(volume, view, pivot, palette)
     image = painted(image, view, marks, Probe.of(renderer))
-    if choice.legend:
+    if choice.legend and isinstance(renderer.transfer, TransferFunction):
         made, (x, y) = legend_for(view.size, renderer.transfer, volume, palette)
         lay_over(image, made.picture, x, y)
     return image

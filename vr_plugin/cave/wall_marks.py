@@ -58,7 +58,8 @@ class WallMarks:
         self._picks = wand.picks
         ray = wand.ray_in_world
         if ray is not None:
-            probe = psw.Probe(self._loop.renderer.volume, self._loop.renderer.transfer, self._loop.regions)
+            shown = self._loop.renderer
+            probe = psw.Probe(shown.volume, shown.transfer, self._loop.regions, shown.look)
             self.marking.take(probe.first_hit(*ray))
 
     def seen(self, picture: Picture) -> psw.marks.Veiled | None:

@@ -106,8 +106,9 @@ class Marking:
         extent = (high - low) or 1.0
         if window is None:
             window = (low + high) / 2, extent
-            if self._transfer is not None:
-                window = psw.window_of(self._transfer())
+            transfer = None if self._transfer is None else self._transfer()
+            if isinstance(transfer, psw.TransferFunction):
+                window = psw.window_of(transfer)
         level, width = window
         width = min(max(width, _NARROWEST * extent), 10 * extent)
         level = min(max(level + upwards * _LEVELS_PER_HEIGHT * width, low - extent), high + extent)

@@ -23,8 +23,12 @@ class ShownMarks:
     @property
     def probe(self) -> psw.Probe:
         """Of what the renderer shows now."""
-        shown = self.renderer.transfer, self.renderer.regions
-        if self._probe is None or (self._probe.transfer, self._probe.regions) != shown:
+        probe, shown = self._probe, self.renderer
+        if probe is None or (probe.transfer, probe.regions, probe.look) != (
+            shown.transfer,
+            shown.regions,
+            shown.look,
+        ):
             # Steps of a voxel, not half: marks err by a few steps of the screen, in half the time.
             self._probe = psw.Probe.of(self.renderer, step=min(self.renderer.volume.spacing))
         return self._probe

@@ -34,7 +34,8 @@ class PictureMarks(ShownMarks):
 
     def legend(self, wanted: Wanted) -> tuple[psw.marks.Legend, tuple[int, int]] | None:
         """The legend and its place in the window, the same object while it is the same; None without."""
-        if not wanted.marks.legend or wanted.outside:
+        one_dimensional = isinstance(self.renderer.transfer, psw.TransferFunction)
+        if not wanted.marks.legend or wanted.outside or not one_dimensional:
             return None
         key = self.renderer.transfer, wanted.size
         if self._legend is None or self._legend[0] != key:
