@@ -319,8 +319,8 @@ PROBE_SMOOTH = 2 * 0.25**2 / 8 / 2
 # Where a step crosses an edge from nothing to all, its colours are mixed whichever comes first: they differ
 # by up to 0.8, and half of the square of its opacity, 0.16 in half a voxel, is mixed wrongly.
 PROBE_EDGES = 0.8 * 0.16**2 / 2
-# Waves as of PROBE_SMOOTH in steps of half a voxel leave a quarter of that, 0.008; magnitudes are read to 1/126
-# of the function's, a hundredth of its slope, either way from sample to sample.
+# Waves as of PROBE_SMOOTH in steps of half a voxel leave a quarter of that, 0.008; magnitudes are read to
+# 1/126 of the function's, a hundredth of its slope, either way from sample to sample.
 PROBE_GRADIENTS = 0.01
 # A step of half a voxel, in which hits are looked for in pieces of 1/16: where the value is linear an opaque
 # surface lies within such a piece.
