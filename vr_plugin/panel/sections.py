@@ -241,8 +241,10 @@ class Sections:
             if implot.begin_plot(f"##{name}", (-1, 2.6 * imgui.get_font_size()), flags):
                 bare = implot.AxisFlags_.no_decorations
                 implot.setup_axes("", "", bare, bare)
-                most = float(values.max()) if len(values) else 1.0
-                implot.setup_axes_limits(-SECONDS, 0.0, 0.0, 1.15 * max(most, 1e-6), implot.Cond_.always)
+                most = (
+                    float(1.5 * np.quantile(values, 0.9)) if len(values) else 1.0
+                )  # not a first compilation
+                implot.setup_axes_limits(-SECONDS, 0.0, 0.0, max(most, 1e-6), implot.Cond_.always)
                 if len(values):
                     spec = implot.Spec()
                     spec.line_color, spec.line_weight = (0.55, 0.78, 1.0, 1.0), 1.5
