@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from .scene import Scene
     from .settings import Settings
     from .volume.files import load
+    from .volume.gradient import largest_magnitude
     from .volume.grid import Volume
     from .warp.canvas import Canvas
     from .warp.context import OffscreenContext
@@ -86,6 +87,7 @@ __all__ = [
     "editing",
     "images",
     "ladder_for",
+    "largest_magnitude",
     "load",
     "marks",
     "read_trace",
@@ -136,6 +138,7 @@ _HOME = {
     "Volume": ".volume.grid",
     "Wall": ".geometry.view",
     "ladder_for": ".quality.saved_ladder",
+    "largest_magnitude": ".volume.gradient",
     "load": ".volume.files",
     "read_trace": ".measure.trace_reading",
     "value_counts": ".optics.histogram",

@@ -30,7 +30,9 @@ class Telling(Panel):
         desk = self.desk
         state = {
             "places": dict(self.places),
-            "points": desk.transfer.points,
+            "points": desk.edit.transfer.points,
+            "shapes": desk.shapes.transfer.to_dict()["tf2d"],
+            "counted": not self._sections.is_waiting,
             "crop": desk.crop,
             "clip": desk.regions.clip,
             "quality": desk.choices.quality,

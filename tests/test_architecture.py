@@ -90,7 +90,7 @@ RESERVED = {
     # frontend: context, input and drawing; the others: widgets. What they edit knows nothing of them.
     "imgui_bundle": {
         f"vr_plugin.panel.{name}"
-        for name in ("frontend", "sections", "light_section", "tf_plot", "view_handles")
+        for name in ("frontend", "sections", "light_section", "shape_plot", "tf_plot", "view_handles")
     },
     # A host that is not ours, in the example of the plug-in only: nobody needs these packages to use it.
     "moderngl": {f"vr_plugin.examples.moderngl_{part}" for part in ("host", "scene")},

@@ -280,3 +280,35 @@ def test_a_window_by_dragging_is_one_step(desk: Desk):
     desk.edit.undo()
     desk.hand_over()
     assert desk.transfer is own
+
+
+# --- functions of value and gradient ----------------------------------------------------------------------
+
+
+def test_both_kinds_of_functions_are_kept_while_the_other_is_shown(desk: Desk):
+    own = desk.transfer
+    desk.show_2d(True)
+    first = desk.transfer
+    assert desk.is_2d and desk.editor is desk.shapes and first is desk.shapes.transfer
+    desk.shapes.add(psw.Triangle(100.0, (1.0, 20.0), 10.0, (1, 0, 0), 0.5))
+    desk.hand_over()
+    assert len(desk.transfer.shapes) == 2
+    desk.show_2d(False)
+    assert desk.transfer is own
+    desk.show_2d(True)
+    desk.shapes.undo()
+    desk.hand_over()
+    assert desk.transfer is first
+    desk.choose_preset("fog")
+    assert not desk.is_2d and desk.preset == "fog"
+    desk.edit.undo()
+    desk.hand_over()
+    assert desk.transfer is own
+
+
+def test_a_scene_may_start_with_a_2d_function():
+    row = {"shape": "box", "values": [50, 200], "magnitudes": [0, 90], "colour": [1, 1, 1], "opacity": 0.2}
+    desk = desk_of(synthetic_ct(16), tf2d=[row])
+    assert desk.is_2d and desk.shapes.transfer is desk.transfer
+    assert isinstance(desk.edit.transfer, psw.TransferFunction)
+    assert desk.preset == "the scene's own"

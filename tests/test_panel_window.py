@@ -174,7 +174,7 @@ def test_a_dragged_point_is_where_the_pixels_say_and_the_picture_is_that_functio
         plain.leave()
     assert (edited[:, columns] == without[:, columns]).all()
     preview.focus(preview.title)
-    preview.hand("key", "F2", *PAUSE)
+    preview.hand("sleep", 0.3, "key", "F2", *PAUSE)  # the other window's end gives the keyboard away, too
     preview.until_shown(without)
     preview.hand("key", "F2", *PAUSE)
 
@@ -276,3 +276,28 @@ def test_without_its_package_the_preview_says_so_and_goes_on(display: str, tmp_p
     assert json.loads(done.stdout)["frames"] == 3
     assert "pip install 'persp-sw[panel]'" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_shape_over_the_joint_histogram_is_dragged(preview: Preview):
+    preview.click("by value and gradient")
+    state = preview.until(lambda now: "shape 0 middle" in now["places"] and now["counted"])
+    places = state["places"]
+    home = preview.at_rest()
+    by = (-40, -12)
+    preview.drag(places["shape 0 middle"], by)
+    moved = preview.until(lambda now: now["shapes"] != state["shapes"])
+    preview.at_rest()
+    moved = preview.states[-1]
+    (was,), (now,) = state["shapes"], moved["shapes"]
+    across = places["shape 0 right"][0] - places["shape 0 left"][0]
+    up = places["shape 0 low"][1] - places["shape 0 high"][1]
+    for name, pixels, size in (("values", by[0], across), ("magnitudes", -by[1], up)):
+        share = pixels / size
+        extent = was[name][1] - was[name][0]
+        expected = np.array(was[name]) + share * extent
+        assert now[name] == pytest.approx(expected, abs=FLOAT32_PIXELS / size * extent)
+    assert (preview.at_rest() != home)[:, : SIZE[0] // 3].any()
+    preview.click("Undo")
+    preview.until(lambda now: now["shapes"] == state["shapes"])
+    preview.until_shown(home[:, : SIZE[0] // 3])
+    preview.leave()

@@ -10,6 +10,7 @@ import numpy as np
 
 import persp_sw as psw
 
+from .shape_edit import ShapeEdit
 from .tf_edit import TransferEdit
 
 if TYPE_CHECKING:
@@ -29,34 +30,57 @@ class Desk:
 
     Attributes
     ----------
-    edit
-        The transfer function under the user's hand.
+    edit, shapes
+        The transfer function under the user's hand: one of values, and one of values and gradient magnitudes.
+        Each has a history of its own; the one that is shown is `editor`.
     """
 
     def __init__(self, choices: Choices, pictures: PreviewPictures):
         self.choices, self._pictures = choices, pictures
         self.volume: psw.Volume = pictures.renderer.volume
         self._lighting = psw.Lighting()  # what light comes back to
-        low, high = self.volume.value_range
-        self.edit = TransferEdit(self.transfer, (float(low), float(high)))
+        low, high = map(float, self.volume.value_range)
+        half = float(psw.largest_magnitude(self.volume)) / 2  # what hardly a volume reaches
+        shown, named = self.transfer, [name for name in choices.presets if name is not None]
+        plane = shown if self.is_2d else _first_shapes(low, high, half)
+        if self.is_2d:
+            ramp = psw.window_level((low + high) / 2, (high - low) or 1.0)
+            shown = pictures.transfer_of(named[0]) if named else ramp
+        self.edit = TransferEdit(shown, (low, high))
+        self.shapes = ShapeEdit(plane, (low, high, half))
 
     # --- the transfer function -----------------------------------------------------------------------------
 
     @property
-    def transfer(self) -> psw.TransferFunction:
+    def transfer(self) -> psw.TransferFunction | psw.TransferFunction2D:
         """As it is shown."""
         return self.choices.edits.transfer or self._pictures.transfer_of(self.choices.preset)
 
+    @property
+    def is_2d(self) -> bool:
+        """Whether what is shown depends on gradient magnitudes, too."""
+        return isinstance(self.transfer, psw.TransferFunction2D)
+
+    @property
+    def editor(self) -> TransferEdit | ShapeEdit:
+        """Of what is shown."""
+        return self.shapes if self.is_2d else self.edit
+
+    def show_2d(self, plane: bool) -> None:
+        """Show the function of values and gradient magnitudes, or that of values alone, as it was left."""
+        transfer = self.shapes.transfer if plane else self.edit.transfer
+        self.choices.edits = replace(self.choices.edits, transfer=transfer)
+
     def take_over(self) -> None:
         """Let the editor know what keys have changed: another preset is a step that can be undone."""
-        if self.edit.transfer is not self.transfer:
+        if self.editor.transfer is not self.transfer:
             dragged = "window" if self.choices.window else None  # level and width: a drag is one step
-            self.edit.apply(self.transfer, dragged)
+            self.editor.apply(self.transfer, dragged)
 
     def hand_over(self) -> None:
         """Show what the editor has."""
-        if self.edit.transfer is not self.transfer:
-            self.choices.edits = replace(self.choices.edits, transfer=self.edit.transfer)
+        if self.editor.transfer is not self.transfer:
+            self.choices.edits = replace(self.choices.edits, transfer=self.editor.transfer)
 
     @property
     def preset(self) -> str:
@@ -73,8 +97,9 @@ class Desk:
 
     def choose_preset(self, name: str | None) -> None:
         """A preset's transfer function, as a step that can be undone."""
-        self.edit.apply(self._pictures.transfer_of(name))
-        self.hand_over()
+        transfer = self._pictures.transfer_of(name)
+        self.choices.edits = replace(self.choices.edits, transfer=transfer)
+        self.take_over()
 
     @property
     def target_hz(self) -> float:
@@ -168,3 +193,11 @@ class Desk:
         """One clip plane less."""
         clip = [plane for n, plane in enumerate(self.regions.clip) if n != number]
         self.set_regions(replace(self.regions, clip=tuple(clip)))
+
+
+def _first_shapes(low: float, high: float, top: float) -> psw.TransferFunction2D:
+    """What a first 2D function shows: boundaries of the brighter values, and no inside."""
+    colour = (0.9, 0.55, 0.25)
+    across, up = (high - low) or 1.0, top or 1.0
+    box = psw.Box((low + 0.25 * across, low + 1.05 * across), (0.08 * up, 0.6 * up), colour, 0.3)
+    return psw.TransferFunction2D([box])

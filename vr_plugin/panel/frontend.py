@@ -83,7 +83,7 @@ class Panel:
     @property
     def wants_frame(self) -> bool:
         """Whether it looks different from what was drawn last."""
-        return not self._drawn or self._settling > 0
+        return not self._drawn or self._settling > 0 or self._sections.is_waiting
 
     def take(self, events: Iterable[Event], wanted: Wanted) -> list[Event]:
         """Look at what happened, and act; the events that are not for it."""
@@ -91,8 +91,8 @@ class Panel:
         self._wanted = wanted
         self.desk.take_over()
         left = [event for event in events if not self._takes(event)]
-        if self._stale or self._settling > 0:
-            self._settling -= not self._stale
+        if self._stale or self._settling > 0 or self._sections.is_waiting:
+            self._settling -= self._settling > 0 and not self._stale
             self._pass()
         return left
 
@@ -114,6 +114,7 @@ class Panel:
         """Delete all that it made."""
         if self._context is not None:
             self._use()
+            self._sections.close()
             with kept_state():
                 self._renderer.shutdown()
             implot.destroy_context(self._plots)
@@ -165,7 +166,7 @@ class Panel:
             if io.want_text_input:
                 return True
             if event.control and event.name == "Z":
-                (self.desk.edit.redo if event.shift else self.desk.edit.undo)()
+                (self.desk.editor.redo if event.shift else self.desk.editor.undo)()
                 self.desk.hand_over()
                 return True
             return bool(io.want_capture_keyboard)

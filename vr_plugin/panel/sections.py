@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from imgui_bundle import imgui, implot
 
+import persp_sw as psw
 from persp_sw.errors import PerspSWError
 
 from ..rig import STEREO_MODES
@@ -16,6 +17,8 @@ from ..stereo import MODES
 from .colours import decoded, encoded
 from .desk import Desk
 from .light_section import LightSection
+from .shape_edit import shape_like
+from .shape_plot import ShapePlot
 from .statistics import SECONDS, Recent
 from .tf_plot import TransferPlot
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
 
 _WIDTH_EM = 25.0  # of the panel
 _OPEN = imgui.TreeNodeFlags_.default_open
+_CLAMPED = imgui.SliderFlags_.always_clamp
 _TARGETS = (0.0, 15.0, 24.0, 30.0, 60.0, 72.0, 90.0, 120.0)
 
 
@@ -43,11 +47,21 @@ class Sections:
         self.shows_handles = False
         self._preview, self._choices, self._places = preview, preview.choices, places
         self._plot = TransferPlot(desk.edit, desk.volume, places)
+        self._plane = ShapePlot(desk.shapes, desk.volume, places)
         self._light = LightSection(desk, self._mark, self._button)
         self._file, self._handles_wanted = "transfer.json", True
         inputs = implot.get_input_map()
         inputs.pan = inputs.fit = imgui.MouseButton_.middle  # the left button moves points
         inputs.override_mod = 0  # and with Ctrl it adds them
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether it will look different soon, by itself."""
+        return self._plane.is_waiting
+
+    def close(self) -> None:
+        """End what it began."""
+        self._plane.close()
 
     def show(self, size: tuple[int, int]) -> None:
         """One pass, in a window of that size."""
@@ -76,20 +90,33 @@ class Sections:
     # --- transfer function ---------------------------------------------------------------------------------
 
     def _transfer(self) -> None:
-        desk, edit = self.desk, self.desk.edit
+        desk, editor = self.desk, self.desk.editor
         self._presets()
-        self._plot.show(11.0 * imgui.get_font_size())
-        imgui.text_disabled("drag · double click adds · right click deletes · wheel zooms")
-        self._button("Undo", edit.undo, edit.history.can_undo)
-        imgui.same_line()
-        self._button("Redo", edit.redo, edit.history.can_redo)
-        imgui.same_line()
-        logarithmic = edit.axis.knee is not None
-        changed, logarithmic = imgui.checkbox("logarithmic", logarithmic)
-        self._mark("logarithmic")
+        changed, plane = imgui.checkbox("by value and gradient", desk.is_2d)
+        self._mark("by value and gradient")
         if changed:
-            edit.set_logarithmic(logarithmic)
-        self._selected_point()
+            desk.show_2d(plane)
+            editor = desk.editor
+        if desk.is_2d:
+            self._plane.show(14.0 * imgui.get_font_size())
+            imgui.text_disabled("drag middles and sides · right click deletes · wheel zooms")
+        else:
+            self._plot.show(11.0 * imgui.get_font_size())
+            imgui.text_disabled("drag · double click adds · right click deletes · wheel zooms")
+        self._button("Undo", editor.undo, editor.history.can_undo)
+        imgui.same_line()
+        self._button("Redo", editor.redo, editor.history.can_redo)
+        imgui.same_line()
+        if desk.is_2d:
+            self._selected_shape()
+        else:
+            edit = desk.edit
+            logarithmic = edit.axis.knee is not None
+            changed, logarithmic = imgui.checkbox("logarithmic", logarithmic)
+            self._mark("logarithmic")
+            if changed:
+                edit.set_logarithmic(logarithmic)
+            self._selected_point()
         self._files()
         desk.hand_over()
 
@@ -125,12 +152,33 @@ class Sections:
             edit.release()
         imgui.end_disabled()
 
+    def _selected_shape(self) -> None:
+        edit, index = self.desk.shapes, self.desk.shapes.selected
+        shape = edit.transfer.shapes[0 if index is None else index]
+        self._button("Add a box", lambda: edit.add(shape_like(shape, edit.limits, psw.Box)))
+        imgui.same_line()
+        self._button("Add a triangle", lambda: edit.add(shape_like(shape, edit.limits, psw.Triangle)))
+        imgui.begin_disabled(index is None)
+        changed, opacity = imgui.slider_float("Opacity", shape.opacity, 0.0, 1.0, "%.3f", _CLAMPED)
+        let_go = imgui.is_item_deactivated()
+        self._mark("Opacity")
+        softer, soft = imgui.slider_float("Softness", shape.soft, 0.0, 1.0, "%.2f", _CLAMPED)
+        let_go = let_go or imgui.is_item_deactivated()
+        if (changed or softer) and index is not None:
+            edit.weigh(index, opacity, soft)
+        changed, picked = imgui.color_edit3("Colour", list(encoded(shape.colour)))
+        if changed and index is not None:
+            edit.recolour(index, decoded(picked))
+        if let_go or imgui.is_item_deactivated():
+            edit.release()
+        imgui.end_disabled()
+
     def _files(self) -> None:
         _, self._file = imgui.input_text("File", self._file)
         self._mark("File")
-        self._button("Save", lambda: self._tried(self.desk.edit.save, "written"))
+        self._button("Save", lambda: self._tried(self.desk.editor.save, "written"))
         imgui.same_line()
-        self._button("Load", lambda: self._tried(self.desk.edit.load, "read"))
+        self._button("Load", lambda: self._tried(self.desk.editor.load, "read"))
 
     def _tried(self, act: Callable[[Path], None], done: str) -> None:
         path = Path(self._file).expanduser()

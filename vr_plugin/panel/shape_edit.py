@@ -80,6 +80,21 @@ def reshaped(
     return replace(shape, values=(left, max(right + across, left + thin)))
 
 
+def shape_like(
+    shape: psw.Box | psw.Triangle,
+    limits: tuple[float, float, float],
+    kind: type[psw.Box] | type[psw.Triangle],
+) -> psw.Box | psw.Triangle:
+    """A new shape as large as another, a little beside it, in its colours: what `ShapeEdit.add` is given."""
+    left, right = shape.values
+    by = 0.05 * (limits[1] - limits[0]), 0.0
+    rest = shape.magnitudes, shape.colour, shape.opacity, shape.soft
+    if kind is psw.Box:
+        return reshaped(psw.Box((left, right), *rest), "middle", by, limits)
+    value, width = (left + right) / 2, (right - left) / 2
+    return reshaped(psw.Triangle(value, rest[0], width, *rest[1:]), "middle", by, limits)
+
+
 class ShapeEdit:
     """An editor's state.
 
@@ -144,8 +159,7 @@ class ShapeEdit:
             return
         part, (from_value, from_magnitude), shape = self._held
         by = value - from_value, magnitude - from_magnitude
-        now = shape if by == (0.0, 0.0) else reshaped(shape, part, by, self.limits)
-        self.set_shape(self.selected, now, ("drag", self._gestures))
+        self.set_shape(self.selected, reshaped(shape, part, by, self.limits), ("drag", self._gestures))
 
     def release(self) -> None:
         """The hand lets go."""
