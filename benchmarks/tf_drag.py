@@ -7,7 +7,7 @@ Without VOLUME, 256³ voxels of `synthetic_ct`. The panel is open; its first con
 is visible, is taken and moved a few pixels at a time, to and fro, as a mouse would; with --colours a point's
 colour changes instead. A move's latency runs from the moment the window hands its event over to the moment
 the buffers with its picture are swapped; a move that a later one has overtaken counts to that one's picture.
-Prints medians and 95th percentiles, of the latency and of its parts.
+Prints medians and 95th percentiles, of the latency and of its parts; the first moves are not counted.
 """
 
 import argparse
@@ -28,6 +28,7 @@ from vr_plugin.screen.events import Button, Pointer
 
 _SETTLE_S = 4.0  # before the first move: compiling, refining
 _REACH = 14.0  # pixels to each side
+_WARM = 12  # first moves, which compile what coarse pictures need and are not counted
 
 
 class DraggingLoop(in_window.PreviewLoop):
@@ -49,7 +50,7 @@ class DraggingLoop(in_window.PreviewLoop):
         at, before = monotonic(), self.preview.choices.edits.transfer
         left = super()._left_by_panel([*events, *self._hand(at)])
         after = self.preview.choices.edits.transfer
-        if after is not before:
+        if after is not before and self._asked > _WARM:
             self._moves.append((at, after))
             self._panel_ms = 1e3 * (monotonic() - at)
         return left
