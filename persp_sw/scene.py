@@ -165,6 +165,13 @@ class Scene:
 
         return look_of(self.keys)
 
+    @staticmethod
+    def keys_of_look(look: Look) -> dict[str, Any]:
+        """Keys for `with_keys` that ask for a look, and take back what others asked for."""
+        from .scene_look import keys_of_look
+
+        return keys_of_look(look)
+
     @cached_property
     def regions(self) -> Regions:
         """Crop, clip planes and slabs."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import (
@@ -136,3 +137,19 @@ def look_of(keys: SceneKeys) -> Look:
     if gradient.modulates:
         modulation = Modulation(**gradient.model_dump(exclude={"distance"}))
     return Look(lighting, modulation, gradient.distance)
+
+
+def keys_of_look(look: Look) -> dict[str, Any]:
+    """Keys that ask for a look: what `look_of` makes it of."""
+    lighting, modulation = look.lighting, look.modulation
+    keys: dict[str, Any] = {"shade": lighting is not None, "light": None, "lights": None, "shadows": None}
+    if lighting is not None:
+        light = asdict(lighting)
+        keys["lights"] = [_listed(one) for one in light.pop("lights")]
+        keys["light"] = _listed(light)
+    keys["gradient"] = {"distance": look.gradient_distance, **(asdict(modulation) if modulation else {})}
+    return keys
+
+
+def _listed(values: dict[str, Any]) -> dict[str, Any]:
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in values.items()}

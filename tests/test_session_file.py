@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -134,22 +135,55 @@ def test_a_preset_that_was_chosen_is_saved_by_name(scene: psw.Scene, tmp_path: P
     assert (keys.tf, keys.opacity_unit) == ("fog", None)
 
 
-def test_a_function_and_regions_that_a_program_changed_are_saved(scene: psw.Scene, tmp_path: Path):
+LIT = psw.Look(
+    psw.Lighting(
+        0.1, 0.7, 0.4, 12.5, lights=(psw.Light((1, 2, 3), (1, 0.9, 0.5), True), psw.Light((0, 0, 1)))
+    ),
+    psw.Modulation(0.01, 0.3, 0.5, 0.25),
+    1.5,
+)
+EDITED = {
+    "a function": {"transfer": psw.TransferFunction([(3, (0.1, 1, 0), 0.0), (90, (1, 1, 0), 0.7)], 0.8)},
+    "shapes": {
+        "transfer": psw.TransferFunction2D([psw.Box((20, 250), (1, 90), (1, 0.5, 0.2), 0.6, 0.5)], 1.0)
+    },
+    "a look": {"look": LIT},
+    "regions": {
+        "regions": psw.Regions(
+            crop=(1, 9, 2, 8, 3, 7.5),
+            crop_flags="fence",
+            clip=[(1, 0, 0, -2.25)],
+            cut=[psw.Cut((0, 1, 0, -5), 2)],
+        )
+    },
+}
+
+
+@pytest.mark.parametrize("edit", EDITED)
+@pytest.mark.parametrize("keys", ["", "."])
+def test_what_hands_edited_is_saved(scene: psw.Scene, tmp_path: Path, edit: str, keys: str):
     preview, pictures = opened(scene)
-    shown(preview, pictures)
-    pictures.renderer.transfer = psw.TransferFunction([(3, (0.1, 1, 0), 0.0), (90, (1, 1, 0), 0.7)])
-    pictures.renderer.regions = psw.Regions(
-        crop=(1, 9, 2, 8, 3, 7.5),
-        crop_flags="fence",
-        clip=[(1, 0, 0, -2.25)],
-        cut=[psw.Cut((0, 1, 0, -5), 2)],
-    )
+    moved(preview, keys)
+    preview.choices.edits = replace(preview.choices.edits, **EDITED[edit])
     picture = shown(preview, pictures)
     session_of(scene, preview, pictures).save(tmp_path / "a.session.toml")
     again = psw.Scene.load(tmp_path / "a.session.toml")
-    assert again.keys.opacity_unit == 0.9  # the smallest spacing, said
-    assert again.regions == pictures.renderer.regions
     assert np.array_equal(shown(*opened(again)), picture)
+    unedited, pictures = opened(scene)
+    moved(unedited, keys)
+    assert not np.array_equal(shown(unedited, pictures), picture)
+    if edit == "a look":
+        assert again.look == LIT
+        assert psw.Scene.keys_of_look(LIT) == psw.Scene.keys_of_look(again.look)
+
+
+def test_marks_are_saved_and_restored(scene: psw.Scene, tmp_path: Path):
+    preview, pictures = opened(scene)
+    choice = psw.marks.MarkChoice(box=True, legend=True, cursor=(1.5, 2, 3), ruler=((0, 0, 0), (1, 2, 2.5)))
+    preview.marking.choice = choice
+    session_of(scene, preview, pictures).save(tmp_path / "a.session.toml")
+    again, _ = opened(psw.Scene.load(tmp_path / "a.session.toml"))
+    assert again.marking.choice == choice
 
 
 def test_a_key_that_is_edited_afterwards_counts(scene: psw.Scene, tmp_path: Path):

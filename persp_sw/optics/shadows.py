@@ -86,7 +86,7 @@ class Shadows:
         """How much of each voxel's surroundings is shown: borders fade over a voxel."""
         z, y, x = (np.arange(n + 1.0) * self.factor for n in self._cells[::-1])
         shown = np.zeros((len(z), len(y), len(x)), np.float32)
-        for part in shown_parts(regions, volume, np.array(volume.size) / 2):
+        for part in shown_parts(regions, volume, np.append(np.array(volume.size) / 2, 1.0)):
             inside = np.ones_like(shown)
             for a, b, c, d in part.half_spaces:
                 size = np.linalg.norm([a, b, c]) * self.factor

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -50,6 +51,19 @@ class SavedCamera(BaseModel):
         return Camera(Pose(self.position, self.orientation), self.distance, self.fovy)
 
 
+class SavedMarks(BaseModel):
+    """The marks that are shown; the keys of `psw.marks.MarkChoice`."""
+
+    model_config = ConfigDict(extra="forbid")
+    box: bool = False
+    axes: bool = False
+    scale_bar: bool = False
+    legend: bool = False
+    cursor: tuple[Number, Number, Number] | None = None
+    planes: bool = False
+    ruler: tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]] | None = None
+
+
 class SavedView(BaseModel):
     """The keys of `[view]`; all may be missing."""
 
@@ -65,6 +79,7 @@ class SavedView(BaseModel):
     quality: Annotated[Number, Field(ge=QUALITIES[0], le=QUALITIES[1])] | None = None  # where it is held
     overlay: bool = True
     volume_outside: bool = True
+    marks: SavedMarks | None = None
 
     @classmethod
     def of(cls, preview: Preview, *, held: bool) -> SavedView:
@@ -82,6 +97,7 @@ class SavedView(BaseModel):
             quality=choices.quality if held else None,
             overlay=choices.overlay,
             volume_outside=choices.volume_outside,
+            marks=SavedMarks(**asdict(preview.marking.choice)) if preview.marking.choice else None,
         )
 
     @classmethod
@@ -112,6 +128,8 @@ class SavedView(BaseModel):
             choices.stereo = Stereo(self.stereo, self.swapped, self.flat)
         choices.separation = self.separation or choices.separation
         choices.overlay, choices.volume_outside = self.overlay, self.volume_outside
+        if self.marks is not None and not preview.marking.choice:  # the command line's come first
+            preview.marking.choice = psw.marks.MarkChoice(**self.marks.model_dump())
         if self.outside and not preview.is_outside:
             preview.key("TAB", True)
             preview.key("TAB", False)

@@ -17,8 +17,8 @@ def session_of(scene: psw.Scene, preview: Preview, pictures: PreviewPictures) ->
     """The scene as it is shown now; all its other keys stay.
 
     Camera and window size take the place of the scene's own, so that `persp-sw render` gives the same
-    picture; transfer function and regions do where they are others than the scene's; the rest is the table
-    `view`, which `persp-sw view` restores.
+    picture; transfer function, regions and look do where they are others than the scene's; the rest is the
+    table `view`, which `persp-sw view` restores.
     """
     view = SavedView.of(preview, held=preview.choices.quality is not None)
     keys: dict[str, Any] = {
@@ -27,7 +27,8 @@ def session_of(scene: psw.Scene, preview: Preview, pictures: PreviewPictures) ->
         "size": list(preview.size),
         "view": view.model_dump(mode="json", exclude_none=True),
     }
-    return scene.with_keys(**keys, **_transfer(scene, preview, pictures), **_regions(scene, pictures))
+    edited = [make(scene, preview, pictures) for make in (_transfer, _regions, _look)]
+    return scene.with_keys(**keys, **edited[0], **edited[1], **edited[2])
 
 
 def save_session(
@@ -43,17 +44,25 @@ def save_session(
 
 def _transfer(scene: psw.Scene, preview: Preview, pictures: PreviewPictures) -> dict[str, Any]:
     own, name = scene.preset.name if scene.preset else None, preview.choices.preset
-    if name != own:
-        return {"tf": name, "opacity_unit": None}
-    shown = pictures.renderer.transfer
-    if shown is scene.transfer or not pictures.shows_preset(name):
-        return {"tf": name} if name is not None else {}
+    shown = preview.choices.edits.transfer
+    if shown is None:
+        if name != own:
+            return {"tf": name, "tf2d": None, "window": None, "opacity_unit": None}
+        shown = pictures.renderer.transfer
+        if shown is scene.transfer or not pictures.shows_preset(name):
+            return {"tf": name} if name is not None else {}
     unit = shown.opacity_unit or min(pictures.renderer.volume.spacing)
-    return {"tf": shown.to_dict()["tf"], "opacity_unit": float(unit)}
+    keys = {"tf": None, "tf2d": None, "window": None, **shown.to_dict()}
+    return {**keys, "opacity_unit": float(unit)}
 
 
-def _regions(scene: psw.Scene, pictures: PreviewPictures) -> dict[str, Any]:
-    regions = pictures.renderer.regions
+def _look(scene: psw.Scene, preview: Preview, pictures: PreviewPictures) -> dict[str, Any]:
+    look = preview.choices.edits.look or pictures.renderer.look
+    return {} if look == scene.look else psw.Scene.keys_of_look(look)
+
+
+def _regions(scene: psw.Scene, preview: Preview, pictures: PreviewPictures) -> dict[str, Any]:
+    regions = preview.choices.edits.regions or pictures.renderer.regions
     if regions is scene.regions:
         return {}
     return {
