@@ -110,6 +110,7 @@ def phong(lighting, colour, normal, sight):
             mirrored = mirrored - (normal**2).sum(-1, keepdims=True) * sight
             glance = (mirrored * towards).sum(-1, keepdims=True)
         light = light + lighting.diffuse * np.array(shine) * np.maximum(cosine, 0)
+        glance = np.where((normal * sight).sum(-1, keepdims=True) > 0, glance, 0)
         gloss = gloss + lighting.specular * np.array(shine) * np.maximum(glance, 0) ** lighting.power
     return light * colour + gloss
 

@@ -107,6 +107,8 @@ def answers(lights, normal, sight, light):
     else:
         square = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]
         glance = 2 * facing * cosine - square * between
+    if facing <= 0:  # seen from behind
+        glance = 0.0
     return max(cosine, 0.0), glance
 
 
@@ -121,11 +123,10 @@ def light_zones(lights, gradient, sight):
     """Two numbers that differ wherever a step, or only a bend, of the light lies between two places."""
     steps, bends = 0, 0
     facing = gradient[0] * sight[0] + gradient[1] * sight[1] + gradient[2] * sight[2]
-    if lights.two_sided:
-        if len(lights.towards) > 1:
-            steps = 1 if facing < 0 else 0
-        else:
-            bends = 1 if facing < 0 else 0
+    if len(lights.towards) > 1:
+        steps = 1 if facing < 0 else 0
+    else:
+        bends = 1 if facing < 0 else 0
     normal = normal_of(lights, gradient, sight)
     for n in range(len(lights.towards)):
         cosine, glance = answers(lights, normal, sight, light_direction(lights, n, sight))
