@@ -1,10 +1,10 @@
 """A scene in VTK, rendered off screen by one of its volume mappers. Needs the package vtk.
 
-VTK's pictures are comparable with ours as far as VTK allows: no shading, no jitter, no background, linear
-interpolation, a sample a voxel edge unless said, the same points of the transfer function. What else differs
-is VTK's: 8 bits a channel; tables of 1024 entries, looked up half an entry off; Mesa's llvmpipe filters 8-bit
-volumes with 8 bits; crop planes off by up to half a voxel; the fixed-point mapper's picture is wider than
-the volume by half a pixel at any resolution.
+VTK's pictures are comparable with ours as far as VTK allows: shading by its headlight alone, no jitter, no
+background, linear interpolation, a sample a voxel edge unless said, the same points of the transfer function.
+What else differs is VTK's: 8 bits a channel; tables of 1024 entries, looked up half an entry off; Mesa's
+llvmpipe filters 8-bit volumes with 8 bits; crop planes off by up to half a voxel; the fixed-point mapper's
+picture is wider than the volume by half a pixel at any resolution.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from vtkmodules.vtkRenderingCore import (
 from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper, vtkGPUVolumeRayCastMapper
 
 from ..errors import SettingsError
-from ..geometry.regions import Regions
 from ..geometry.view import View
+from ..optics.look import Look
 from ..optics.transfer import TransferFunction
 from ..volume.grid import Volume
 from .cases import Stage
@@ -67,7 +67,7 @@ class VtkScene:
         self._window.SetMultiSamples(0)
         self._window.AddRenderer(self._renderer)
         self._renderer.SetNearClippingPlaneTolerance(_NEAR_TOLERANCE)
-        self._renderer.AddVolume(_prop(stage.volume, stage.transfer, stage.regions, self._mapper))
+        self._renderer.AddVolume(_prop(stage, self._mapper))
 
     def draw(self, view: View) -> float:
         """Render; wall milliseconds until the picture is complete, without reading it back."""
@@ -120,9 +120,12 @@ def _mapper(name, threads, distance, pixel_step):
     return mapper
 
 
-def _prop(volume: Volume, transfer: TransferFunction, regions: Regions, mapper) -> vtkVolume:
+def _prop(stage: Stage, mapper) -> vtkVolume:
     """The volume as a VTK prop, drawn by `mapper`."""
-    transfer = transfer.with_unit(min(volume.spacing))
+    volume, regions = stage.volume, stage.regions
+    if not isinstance(stage.transfer, TransferFunction):
+        raise SettingsError("VTK is not compared on two-dimensional transfer functions")
+    transfer = stage.transfer.with_unit(min(volume.spacing))
     image = vtkImageData()
     image.SetDimensions(*volume.size)
     # VTK measures opacity before the pose, which so keeps lengths (no shear).
@@ -134,6 +137,7 @@ def _prop(volume: Volume, transfer: TransferFunction, regions: Regions, mapper) 
     looks.SetScalarOpacity(opacity)
     looks.SetScalarOpacityUnitDistance(transfer.opacity_unit)
     looks.SetInterpolationTypeToLinear()
+    _shade(looks, stage.look)
     mapper.SetInputData(image)
     if regions.crop is not None:
         mapper.SetCroppingRegionPlanes(*np.array(regions.crop) * np.repeat(volume.spacing, 2))
@@ -157,6 +161,24 @@ def _prop(volume: Volume, transfer: TransferFunction, regions: Regions, mapper) 
     prop.SetMapper(mapper)
     prop.SetProperty(looks)
     return prop
+
+
+def _shade(looks: vtkVolumeProperty, look: Look) -> None:
+    """Phong's model with VTK's own headlight, which shines along the camera's axis, not each ray's."""
+    lighting = look.lighting
+    if look.modulation or (lighting and (lighting.lights or lighting.model != "phong")):
+        raise SettingsError(
+            "VTK is compared by its headlight: take lights, modulation and Blinn's model away"
+        )
+    if lighting is None:
+        return
+    if not lighting.headlight[0] == lighting.headlight[1] == lighting.headlight[2]:
+        raise SettingsError(f"VTK is compared by a white headlight; given {lighting.headlight}")
+    looks.ShadeOn()
+    looks.SetAmbient(lighting.ambient + lighting.emissive)
+    looks.SetDiffuse(lighting.diffuse * lighting.headlight[0])
+    looks.SetSpecular(lighting.specular * lighting.headlight[0])
+    looks.SetSpecularPower(lighting.power)
 
 
 def _functions(

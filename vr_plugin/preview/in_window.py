@@ -298,7 +298,7 @@ class PreviewLoop:
         if figures["encode_ms"]:
             self.window.set_title(self._title)
         if self._shots.asked():  # two threads must not work with one renderer
-            self._give_up_refining()
+            self.background.give_up()
         self._shots.write_if_asked(wanted, done)
         return figures
 
