@@ -175,7 +175,14 @@ def test_flights_sessions_and_large_pictures_are_kept(preview: Preview, tmp_path
     preview.hand("key", "F9")
     preview.hand(*DRAG)
     preview.until(lambda p: apart(p, home) > 1)
-    time.sleep(0.5)
+    before = [home]
+
+    def at_rest(picture: np.ndarray) -> bool:
+        time.sleep(0.4)
+        before.append(picture)
+        return np.array_equal(*before[-2:])
+
+    preview.until(at_rest)
     for key, name in (("F9", "flight-001.csv"), ("F5", "001.session.toml"), ("p", "view-001.png")):
         preview.hand("key", key)
         end = time.monotonic() + SECONDS

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -119,8 +120,16 @@ class Program:
 
     def focus(self, title: str) -> str:
         """Give the keyboard to a window: no window manager is there to do so."""
-        number = self.window(title)
-        self.hand("windowfocus", "--sync", number)
+        end = time.monotonic() + SECONDS
+        while True:
+            number = self.window(title)
+            try:
+                self.hand("windowfocus", "--sync", number)
+                break
+            except subprocess.CalledProcessError:  # of the program before, and closed since it was found
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.1)
         return number
 
     def grab(self, path: Path | None = None) -> np.ndarray:
