@@ -10,6 +10,7 @@ import numpy as np
 from .._jit import VECTORS, inlined_kernel, lean_kernel
 from .packet_portable import WINDOW
 from .phong import PER_SHADOW, REACH, SHADOW, START
+from .scanline import ROUNDING
 from .state import LEFT, NEIGHBOURS, TILE
 
 if VECTORS:
@@ -48,16 +49,16 @@ def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cell
     j, k = min(np.int64(y), n_j - 2), min(np.int64(z), n_k - 2)
     at_00 = _BEFORE + ((shadow * n_j + j) * n_k + k) * n_i
     first = np.int64(min(max(x_0, low), high))
-    end = min(np.int64(min(max(x_0 + (TILE - 1) * step, low), high)) + 1, n_i - 1)
+    end = min(np.int64(min(max(x_0 + (TILE - 1) * step, low), high) + ROUNDING) + 1, n_i - 1)
     first = min(first, end - 1)
+    start = np.float64(first)  # for all windows: float32 must not round a place out of two neighbours
     while first < end:
         last = min(first + WINDOW - 1, end)
-        start = np.float64(first)
         sample(
             n, last - first + 1, shades.shadows, at_00 + first, at_00 + n_k * n_i + first,
             at_00 + n_i + first, at_00 + (n_k + 1) * n_i + first, _F(y - j), _F(z - k), _F(x_0 - start),
-            _F(step), _F(low - start), _F(high - start), _F(n_i - 2.0 - start), _F(0.0), _F(last - first),
-            scratch, cells, lanes, np.int64(room),
+            _F(step), _F(low - start), _F(high - start), _F(n_i - 2.0 - start), _F(np.float64(first) - start),
+            _F(np.float64(last) - start), scratch, cells, lanes, np.int64(room),
         )  # fmt: skip
         for l in range(np.uint64(n)):  # noqa: E741
             found = lanes[room + l]
