@@ -80,7 +80,8 @@ class Lighting:
         "phong" or "blinn".
     shadow_offset
         Smallest spacings, 0 … 100, towards a light from where shadows begin to count: with 0 a surface lies
-        in the shadow of its own outermost layer, and is darker than a lit one.
+        in the shadow of its own outermost layer, and is darker than a lit one. Of the shadows' own spacings
+        where they are coarser than the data (volumes of over 160 voxels).
 
     Raises
     ------

@@ -52,7 +52,7 @@ def shade_of(
     return Shade(
         numbers,
         _colours(lighting, lighting.headlight),
-        _lights(lighting, volume, axes),
+        _lights(lighting, volume, axes, 1 if shadows is None else shadows.factor),
         np.ascontiguousarray(normal_from_slopes, np.float32),
         np.ascontiguousarray(volume.world_from_object[:3, axes], np.float32),
         np.zeros(1, np.uint16) if shadows is None else shadows.standard(tuple(axes)),
@@ -65,9 +65,10 @@ def _colours(lighting: Lighting, colour: tuple[float, float, float]) -> NDArray[
     return np.outer([lighting.diffuse, lighting.specular], colour).astype(np.float32).ravel()
 
 
-def _lights(lighting: Lighting, volume: Volume, axes: list[int]) -> NDArray[np.float32]:
+def _lights(lighting: Lighting, volume: Volume, axes: list[int], coarser: int) -> NDArray[np.float32]:
     object_from_world = np.linalg.inv(volume.world_from_object[:3, :3])
-    offset = lighting.shadow_offset * min(volume.spacing)
+    # Shadows that are coarser than the data blur a surface's outermost layer as much more.
+    offset = lighting.shadow_offset * min(volume.spacing) * coarser
     rows, shadows = [], 0
     for light in lighting.lights:
         number, shadows = (shadows, shadows + 1) if light.shadows else (-1, shadows)
