@@ -46,6 +46,36 @@ MIDPOINT_SHADOW = 2e-3
 # Voxels. A ball of radius 4, interpolated, lies up to ¾ / (2 · 4) within the true one, its shadow as well.
 SHADOW_EDGE = 0.15
 
+# --- Shadows -----------------------------------------------------------------------------------------------
+
+# Sums of up to 7³ float64 products of float32 table entries, rounded to float32 once.
+SHADOW_COARSE = 2e-7
+# Of up to 9 slices: what leaves one is rounded to float32, 6e-8, twice, and weights are sums of that size.
+SHADOW_SWEEP = 2e-6
+# Half of 1/65535, and as above.
+SHADOW_BYTES = 0.5 / 65535 + 2e-6
+# Mean over 8³ voxels with a depth of 0.2 each: a slanted light is carried on from voxel to voxel, which is
+# the walk of w and 1 − w that widens by √(w·(1 − w)) ≤ ½ voxel a slice; within that of the sides, 1.4 voxels
+# after 8 slices, a tenth of the volume on each of two sides, light is too bright by an eighth at most.
+SHADOW_SPREAD = 0.1 * 2 / 8
+# Three interpolations of float32 (places in a row up to 150 · 6e-8 off, neighbours 1 apart), 6e-8 each.
+SHADOW_LOOK_UP = 2e-5
+# Voxels. A slanted border fades over a voxel: its mean over the light's way is right to 1/8 · the slope
+# (0.36) between two voxels, 0.045.
+SHADOW_FADE = 0.05
+# Voxels of two, on balls of radius 5, whose light falls by up to a third a voxel: tents of two voxels blur
+# by their variance, 2/3 of a voxel², times half the second difference, 1/3 of that fall, and some more where
+# the light is carried on: 0.13 measured, and a tenth of it on average.
+SHADOW_FACTOR = 0.15
+# Rms of pictures: soft edges of shadows, a tenth of the pixels, where light is off by a tenth of what the
+# lights bring, 0.1 · 0.1 · √0.1.
+SHADOW_PICTURE = 3e-3
+# Of a surface that fades out over 3/40 of a voxel, tents and interpolation leave less than e^(−3.5) in the
+# way of a light that starts two voxels out; with twice the voxels rims of shadows are as much softer.
+SHADOW_OWN = 0.05
+# Voxels: half of a shadow's edge after 9 slices, √(9 / 4), and half a voxel for tents.
+SHADOW_SOFT = 2.0
+
 # --- Metrics -----------------------------------------------------------------------------------------------
 
 # Sums of a few thousand float64 numbers of order 1.
