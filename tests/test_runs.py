@@ -5,6 +5,7 @@ import pytest
 import twins
 
 from persp_sw import TransferFunction, Volume
+from persp_sw.kernels.encode import BLOCK
 from persp_sw.optics.classification import Classification
 from persp_sw.volume.levels import BlockBounds, standard_rows
 from persp_sw.volume.runs import PADDING, RunStore
@@ -88,6 +89,71 @@ def test_exactly_the_needed_voxels_are_stored_bit_for_bit(shape, dtype, pairs):
         blocks = twins.bits(runs.needed, visible.shape[-1])
         ends = blocks & ~np.pad(blocks, ((0, 0), (0, 0), (0, 1)))[..., 1:]
         assert runs.run_count == ends.sum()
+
+
+@pytest.mark.parametrize("reach", [1, 2, 4])
+@pytest.mark.parametrize("pairs", [False, True])
+@pytest.mark.parametrize("shape", [*SHAPES, (3, 12, 700), (12, 2, 515)])
+def test_neighbours_within_reach_are_stored_and_little_more(shape, pairs, reach, rng):
+    """Along each axis alone, for a gradient has no others; along i by whole blocks."""
+    volume = sparse_volume(shape, np.uint8, share=0.004)
+    store = RunStore(volume, Classification.of(bump(), volume))
+    for axis in range(3):
+        plain = RunStore(volume, Classification.of(bump(), volume)).axis(axis, pairs=pairs)
+        runs = store.axis(axis, pairs=pairs, reach=reach)
+        np.testing.assert_array_equal(runs.visible, plain.visible)
+        n_i, n_j, n_k = runs.size
+        blocks = -(-(n_i - 1) // BLOCK)
+        visible = twins.bits(runs.pairs if pairs else runs.visible, blocks)
+        touched = twins.stored_voxels(visible, (n_j, n_k, n_i), pairs)
+        least, most = touched.copy(), touched.copy()
+        for step in range(-reach, reach + 1):
+            for along, grown in ((0, least), (1, least), (2, least), (0, most), (1, most)):
+                grown |= moved(touched, step, along)
+        for block in zip(*np.nonzero(visible), strict=True):
+            j, k, m = block
+            begin, end = BLOCK * (m - 1), BLOCK * (m + 2) + 1
+            most[j : j + 2, k : k + (2 if pairs else 1), max(begin, 0) : end] = True
+        decoded, stored = runs.decode()
+        assert (stored >= least).all() and (stored <= most).all()
+        rows = standard_rows(volume, axis)
+        np.testing.assert_array_equal(decoded[stored], rows[stored])
+        assert runs.voxel_count == stored.sum()
+
+
+def moved(flags, step, axis):
+    """`flags` a few places on along an axis; what leaves is lost."""
+    result = np.zeros_like(flags)
+    n = flags.shape[axis]
+    if abs(step) < n:
+        to, of = [slice(None)] * 3, [slice(None)] * 3
+        to[axis], of[axis] = slice(max(step, 0), n + min(step, 0)), slice(max(-step, 0), n - max(step, 0))
+        result[tuple(to)] = flags[tuple(of)]
+    return result
+
+
+def test_reach_is_encoded_when_first_asked_for_and_kept():
+    store = RunStore(sparse_volume((9, 12, 30), np.uint8), EverythingVisible())
+    near = store.axis(0)
+    far = store.axis(0, reach=2)
+    assert (near.reach, far.reach) == (0, 2)
+    assert store.axis(0, reach=1) is store.axis(0) is far
+    pairs = store.axis(0, pairs=True)
+    assert pairs.has_pairs
+
+
+@pytest.mark.parametrize("word", [0, 1, 2])
+def test_reach_crosses_from_word_to_word(word):
+    """The first and the last block of a word have neighbours in others; the row's ends have none."""
+    data = np.zeros((2, 2, 4 * 64 * 3 + 1), np.uint8)
+    for spot in (4 * 64 * word + 1, 4 * 64 * (word + 1) - 2):
+        data[:] = 0
+        data[0, 0, spot] = 50
+        volume = Volume(data)
+        runs = RunStore(volume, Classification.of(bump(), volume)).axis(2, reach=1)
+        block = spot // 4
+        needed = np.flatnonzero(twins.bits(runs.needed, 192)[0, 0])
+        np.testing.assert_array_equal(needed, [m for m in (block - 1, block, block + 1) if 0 <= m < 192])
 
 
 def test_a_value_between_two_invisible_voxels_is_seen():
