@@ -35,7 +35,7 @@ class Classification2D(Classification):
     per_magnitude
         Of magnitudes a world unit, of values as `volume.lift` brings them near 1.
 
-    Accuracy: nearest entry; the error is at most half a grey level / 2 of 8-bit values, 1/1020 of the shapes'
+    Accuracy: nearest entry; the error is at most half a grey level / 2 of 8-bit values, 1/1016 of the shapes'
     extent of others, and 1/252 of their largest magnitude.
     """
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from .grid import Volume
 
-# Exponents of the largest value beyond which differences, or what scales them to a table's 4096 entries, come
-# near float32's ends, 2^-126 and 2^128.
-_SMALL, _LARGE = -64, 100
+# Exponents of the largest value beyond which squares of gradients, per unit of a millionth, come near
+# float32's ends, 2^-126 and 2^128; what scales differences to a table's 4096 entries is far from them.
+_SMALL, _LARGE = -40, 40
 
 
 def lift_exponent(volume: Volume) -> int:
