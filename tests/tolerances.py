@@ -193,6 +193,15 @@ BOX_TABLE = 5e-3
 # of up to 1.2 begin within a tenth of a voxel, and pixels show what is on one side; 0.1 of a tenth of them.
 PICTURE_2D = 0.012
 
+# --- Light of packets -------------------------------------------------------------------------------------
+
+# Relative to the largest value: two samples of PACKET_SAMPLE, and places of up to 64 voxels, rounded by
+# 4e-6 where a neighbour's is found, of values that differ by up to twice the largest; per half a voxel or
+# more of distance between them.
+PACKET_SLOPES = (2 * 1.1e-6 + 2 * 2 * 4e-6) / 0.5
+# Cosines of float32 normals, some ten roundings of 6e-8, to the power of 50; of lights of up to 0.3.
+PACKET_LIGHT = 3e-5
+
 # --- Powers of cosines ------------------------------------------------------------------------------------
 
 # x^power = 2^y. y is rounded to 24 bits, which is |y| · ln 2 · 6e-8 of 2^y; its logarithm is a sum of an

@@ -98,7 +98,7 @@ def find_slopes(
         sample(
             n, np.int64(last - first) + 1, level.voxels, at_00, at_10, at_01, at_11, weight_j, weight_k,
             _F(x + x_n - start), _F(step), _F(max(low + x_n, 0.0) - start),
-            _F(min(high + x_n, columns - 1.0) - start), _F(columns - 2.0 - start),
+            _F(min(max(high + x_n, 0.0), columns - 1.0) - start), _F(columns - 2.0 - start),
             _F(np.float64(first) - start), _F(np.float64(last) - start), scratch, cells,
             lanes, np.int64(slopes) + TILE * number,
         )  # fmt: skip
