@@ -10,10 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from samples import ROOT, spawn
-from tolerances import PORTABLE_IMAGE
+from tolerances import PORTABLE_2D, PORTABLE_IMAGE, PORTABLE_LIT
 from views import DIRECTIONS, view_of
 
-from persp_sw import Renderer, Settings, TransferFunction, Volume, _jit
+from persp_sw import (
+    Light,
+    Lighting,
+    Look,
+    Modulation,
+    Renderer,
+    Settings,
+    TransferFunction,
+    Volume,
+    _jit,
+)
+from persp_sw.optics.transfer2d import Box, TransferFunction2D
 
 DTYPES = [np.uint8, np.float32]  # test_packets has all; each is compiled anew here
 HAZE = TransferFunction([(0, (0.2, 0.4, 0.9), 0), (255, (1, 0.7, 0.4), 0.5)], 1.0)
@@ -33,6 +44,36 @@ def pictures() -> dict[str, np.ndarray]:
                 view = view_of(volume, towards, distance=0.9)
                 image = renderer.composite(view.eye, [view.wall])
                 found[f"{np.dtype(dtype)}, {samples} samples, view {number}"] = image.pixels
+    return found
+
+
+LIGHTS = (Light((1, 2, 3), (1, 0.6, 0.2), shadows=True), Light((-2, -1, 1), (0.1, 0.3, 1)))
+LOOKS = {
+    "headlight": Look(Lighting()),
+    "lights, modulated": Look(Lighting(lights=LIGHTS, model="blinn"), Modulation(0.0, 0.3, 0.7, 0.5), 1.5),
+}
+SHAPES = TransferFunction2D([Box((60, 260), (0, 60), (1, 0.5, 0.2), 0.4, 1.0)], 1.0)
+
+
+def lit_pictures() -> dict[str, np.ndarray]:
+    """Eye images with light, plain and pre-integrated, and of a two-dimensional function."""
+    z, y, x = np.indices((12, 14, 80))
+    data = 120 + 100 * np.sin(0.3 * x + 0.2) * np.cos(0.4 * y - 0.3) * np.sin(0.3 * z + 0.7)
+    volume = Volume(data.astype(np.uint8))
+    found = {}
+    for transfer, name, look, preintegrated in (
+        (HAZE, "headlight", LOOKS["headlight"], False),
+        (HAZE, "lights, modulated", LOOKS["lights, modulated"], False),
+        (HAZE, "headlight", LOOKS["headlight"], True),
+        (HAZE, "lights, modulated", LOOKS["lights, modulated"], True),
+        (SHAPES, "shapes", LOOKS["lights, modulated"], False),
+    ):
+        for number, (towards, quality) in enumerate([(DIRECTIONS[0], 1.0), (DIRECTIONS[3], 0.25)]):
+            settings = Settings(preintegrated=preintegrated, residual=0, quality=quality)
+            view = view_of(volume, towards, distance=0.9)
+            renderer = Renderer(volume, transfer, settings, look=look)
+            image = renderer.composite(view.eye, [view.wall])
+            found[f"{name}, {preintegrated=}, view {number}"] = image.pixels
     return found
 
 
@@ -59,18 +100,39 @@ from persp_sw import _jit
 from persp_sw.kernels import packet, packet_portable
 assert not _jit.VECTORS and packet.classified is packet_portable
 numpy.savez(sys.argv[1], **test_portable.pictures())
+numpy.savez(sys.argv[2], **test_portable.lit_pictures())
 """
 
 
-@pytest.mark.skipif(not _jit.VECTORS, reason="these are the portable kernels already")
-def test_portable_kernels_draw_the_same_pictures(tmp_path: Path):
-    child(_DRAW, tmp_path / "portable.npz", PERSP_SW_KERNELS="portable")
-    portable = np.load(tmp_path / "portable.npz")
+@pytest.fixture(scope="module")
+def portable(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, dict]:
+    """What a process with portable kernels draws."""
+    folder = tmp_path_factory.mktemp("portable")
+    files = folder / "plain.npz", folder / "lit.npz"
+    child(_DRAW, *files, PERSP_SW_KERNELS="portable")
+    return tuple(dict(np.load(file)) for file in files)
+
+
+NEEDS_VECTORS = pytest.mark.skipif(not _jit.VECTORS, reason="these are the portable kernels already")
+
+
+@NEEDS_VECTORS
+def test_portable_kernels_draw_the_same_pictures(portable):
     ours = pictures()
-    assert sorted(portable) == sorted(ours)
+    assert sorted(portable[0]) == sorted(ours)
     for name, picture in ours.items():
         assert picture[:, 3].max() > 0.5, name
-        assert np.abs(picture - portable[name]).max() < PORTABLE_IMAGE, name
+        assert np.abs(picture - portable[0][name]).max() < PORTABLE_IMAGE, name
+
+
+@NEEDS_VECTORS
+def test_portable_kernels_light_the_same_pictures(portable):
+    ours = lit_pictures()
+    assert sorted(portable[1]) == sorted(ours)
+    for name, picture in ours.items():
+        off = np.abs(picture - portable[1][name])
+        assert picture[:, 3].max() > 0.5, name
+        assert off.max() < (PORTABLE_2D if "shapes" in name else PORTABLE_LIT), name
 
 
 _TELL = """

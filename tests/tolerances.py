@@ -236,6 +236,11 @@ PACKET_BLEND = 8e-7
 # the samples of a ray, which are a tenth of it each and err with either sign.
 PORTABLE_IMAGE = 1e-4
 
+# … and normals and highlights of up to 3 instead of colours below 1.
+PORTABLE_LIT = 3 * PORTABLE_IMAGE
+# … and entries of half a level, four times as far apart, of 0.51 extinction / 100 values.
+PORTABLE_2D = 3 * PORTABLE_IMAGE * 4
+
 # --- Pictures with levels of detail -----------------------------------------------------------------------
 
 # Relative. End voxels of a ramp are too bright at its foot and too dark at its top, as much but at other
