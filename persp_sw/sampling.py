@@ -28,12 +28,13 @@ def choose_sampling(settings: Settings, classification: Classification, volume: 
     Where one sample can hide more than half, what it misses shows: one pre-integrated sample then is as good
     as two to four others, at about the time of two (`docs/performance.md`). It is used where voxels have no
     value, too: its samples lie in the cells that are left out for them, plain ones on the slices between.
-    Elsewhere one plain sample does. A two-dimensional function has no integrals: it has plain samples.
+    Elsewhere one plain sample does. A two-dimensional function has no integrals: where one sample can hide
+    more than half, it has two plain ones.
     """
+    opaque = classification.largest_extinction * max(volume.spacing) > OPAQUE_DEPTH
     if classification.magnitudes > 1:
-        return Sampling(settings.samples_per_interval or 1, False)
+        return Sampling(settings.samples_per_interval or (2 if opaque else 1), False)
     preintegrated = settings.preintegrated
     if preintegrated is None:
-        opaque = classification.largest_extinction * max(volume.spacing) > OPAQUE_DEPTH
         preintegrated = settings.samples_per_interval is None and (opaque or volume.nonfinite > 0)
     return Sampling(settings.samples_per_interval or 1, preintegrated)
