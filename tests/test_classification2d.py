@@ -286,3 +286,7 @@ def test_either_kind_is_told_by_its_type():
     assert classify(SOFT, volume).hides_like(
         classify(TransferFunction2D([replace(BOX, colour=BLUE), TRIANGLE], 1.0), volume)
     )
+    found = classify(SOFT, volume)
+    for changes in ({"origin": 1.0}, {"scale": 3.0}, {"per_magnitude": 1.0}, {"magnitudes": 2}):
+        assert not found.hides_like(replace(found, **changes))
+    assert found.hides_like(replace(found))
