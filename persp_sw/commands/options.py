@@ -104,6 +104,34 @@ _REGION_OPTIONS = [
         help="Show only what is inside, or outside, a slab T thick around a plane; may be repeated.",
     ),
 ]
+_LIGHT_NUMBERS = ("ambient", "diffuse", "specular", "power")
+_LOOK_OPTIONS = [
+    click.option("--shade/--no-shade", default=None, help="Lit, or not; any light that is given lights it."),
+    click.option(
+        "--light",
+        "lights",
+        type=float,
+        nargs=3,
+        multiple=True,
+        metavar="X Y Z",
+        help="A light in this direction, world, besides the headlight; may be repeated.",
+    ),
+    click.option(
+        "--shadows", is_flag=True, default=None, help="The lights cast shadows; the headlight none."
+    ),
+    click.option("--ambient", type=float, metavar="A", help="Light from everywhere. [default: 0.2]"),
+    click.option(
+        "--diffuse", type=float, metavar="D", help="Of a light, what surfaces spread. [default: 0.8]"
+    ),
+    click.option("--specular", type=float, metavar="S", help="Of a light, what they mirror. [default: 0.3]"),
+    click.option("--power", type=float, metavar="P", help="Of highlights: more is smaller. [default: 20]"),
+    click.option(
+        "--modulate",
+        type=float,
+        metavar="OPACITY",
+        help="How much of the opacity is the gradient's, 0 … 1: boundaries instead of what they enclose.",
+    ),
+]
 _SETTING_OPTIONS = [
     click.option(
         "--quality", type=float, default=1.0, show_default=True, help="Sharpness of the eye image, 0.05 … 8."
@@ -148,6 +176,11 @@ def region_options(function: Function) -> Function:
     return _decorated(function, _REGION_OPTIONS)
 
 
+def look_options(function: Function) -> Function:
+    """Lights, shadows and modulation; over the scene file's keys."""
+    return _decorated(function, _LOOK_OPTIONS)
+
+
 def setting_options(function: Function) -> Function:
     """Speed and accuracy."""
     return _decorated(function, _SETTING_OPTIONS)
@@ -188,9 +221,37 @@ def open_scene(path: str, progress: ProgressCall, **given: Any) -> Scene:
             keys[name] = int(keys[name])
     if "tf" in keys and keys["tf"] not in NAMES:  # relative to here, not to the scene
         keys["tf"] = str(Path(keys["tf"]).absolute()) if Path(keys["tf"]).exists() else keys["tf"]
-    if Path(path).suffix.lower() in (".json", ".toml"):
+    is_scene = Path(path).suffix.lower() in (".json", ".toml")
+    _take_look(keys, path if is_scene else None)
+    if is_scene:
         return Scene.load(path, progress=progress, **keys)
     return Scene.of_file(path, progress=progress, **keys)
+
+
+def _take_look(keys: dict[str, Any], scene_file: str | None) -> None:
+    """Make what `look_options` gave the scene's keys, each number beside those that the file has."""
+    light = {name: keys.pop(name) for name in _LIGHT_NUMBERS if name in keys}
+    gradient = {"opacity": keys.pop("modulate")} if "modulate" in keys else {}
+    if "lights" in keys:
+        keys["lights"] = [{"direction": list(direction)} for direction in keys["lights"]]
+    wants_light = [name for name in ("lights", "shadows") if name in keys] + list(light)
+    if wants_light and keys.get("shade") is False:
+        option = "light" if wants_light[0] == "lights" else wants_light[0]
+        raise ViewError(f"--no-shade and --{option} are opposites: leave one of the two out")
+    if wants_light:
+        keys["shade"] = True
+    elif keys.get("shade") is False:  # the file's lights have nothing to do then
+        keys |= {"lights": [], "shadows": False}
+    for name, given in (("light", light), ("gradient", gradient)):
+        if given:
+            of_file = _keys_of(scene_file).get(name, {}) if scene_file else {}
+            keys[name] = {**of_file, **given} if isinstance(of_file, dict) else given
+
+
+def _keys_of(scene_file: str) -> dict[str, Any]:
+    from ..scene_schema import read_text
+
+    return read_text(Path(scene_file))
 
 
 def settings_for(

@@ -12,6 +12,7 @@ from ..optics.presets import NAMES, describe
 from ..scene import Scene
 from .options import (
     json_option,
+    look_options,
     mark_options,
     marks_of,
     open_scene,
@@ -71,6 +72,7 @@ comes before them. --quality and --samples change speed and error, never the loo
 )
 @warp_option
 @setting_options
+@look_options
 @view_options
 @region_options
 @mark_options

@@ -13,6 +13,7 @@ from click.core import ParameterSource
 
 from persp_sw.commands.options import (
     json_option,
+    look_options,
     mark_options,
     marks_of,
     open_scene,
@@ -94,6 +95,7 @@ be repeated. A frame 0 warms up; what is written is the last frame, or every K-t
 @click.option("-o", "--out", type=click.Path(), default=".", show_default=True, help="Folder for pictures.")
 @tf_option
 @setting_options
+@look_options
 @mark_options
 @volume_options
 @json_option

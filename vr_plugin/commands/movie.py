@@ -10,6 +10,7 @@ import numpy as np
 from persp_sw.commands.options import (
     camera_options,
     json_option,
+    look_options,
     open_scene,
     region_options,
     say_missing_voxels,
@@ -94,6 +95,7 @@ file; of pictures, those that are finished stay.
     help="All values on a ray count, or only those at samples; by the transfer function where not said.",
 )
 @setting_options
+@look_options
 @camera_options
 @region_options
 @volume_options

@@ -18,6 +18,7 @@ from click.core import ParameterSource
 from persp_sw.commands.options import (
     NAMES,
     json_option,
+    look_options,
     mark_options,
     marks_of,
     open_scene,
@@ -130,6 +131,7 @@ _PATIENCE_SECONDS = 1.5  # a first picture that takes longer is explained
 @tf_option
 @window_option
 @setting_options
+@look_options
 @region_options
 @mark_options
 @volume_options
