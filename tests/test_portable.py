@@ -99,38 +99,35 @@ import test_portable
 from persp_sw import _jit
 from persp_sw.kernels import packet, packet_portable
 assert not _jit.VECTORS and packet.classified is packet_portable
-numpy.savez(sys.argv[1], **test_portable.pictures())
-numpy.savez(sys.argv[2], **test_portable.lit_pictures())
+numpy.savez(sys.argv[1], **getattr(test_portable, sys.argv[2])())
 """
 
 
-@pytest.fixture(scope="module")
-def portable(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, dict]:
-    """What a process with portable kernels draws."""
-    folder = tmp_path_factory.mktemp("portable")
-    files = folder / "plain.npz", folder / "lit.npz"
-    child(_DRAW, *files, PERSP_SW_KERNELS="portable")
-    return tuple(dict(np.load(file)) for file in files)
+def drawn_portably(which: str, folder: Path) -> dict[str, np.ndarray]:
+    """What a process with portable kernels draws: the pictures of a function here."""
+    child(_DRAW, folder / "portable.npz", which, PERSP_SW_KERNELS="portable")
+    return dict(np.load(folder / "portable.npz"))
 
 
 NEEDS_VECTORS = pytest.mark.skipif(not _jit.VECTORS, reason="these are the portable kernels already")
 
 
 @NEEDS_VECTORS
-def test_portable_kernels_draw_the_same_pictures(portable):
-    ours = pictures()
-    assert sorted(portable[0]) == sorted(ours)
+def test_portable_kernels_draw_the_same_pictures(tmp_path: Path):
+    ours, portable = pictures(), drawn_portably("pictures", tmp_path)
+    assert sorted(portable) == sorted(ours)
     for name, picture in ours.items():
         assert picture[:, 3].max() > 0.5, name
-        assert np.abs(picture - portable[0][name]).max() < PORTABLE_IMAGE, name
+        assert np.abs(picture - portable[name]).max() < PORTABLE_IMAGE, name
 
 
 @NEEDS_VECTORS
-def test_portable_kernels_light_the_same_pictures(portable):
-    ours = lit_pictures()
-    assert sorted(portable[1]) == sorted(ours)
+@pytest.mark.slow  # compiles for a minute and more; test_packet_lit has each part of it
+def test_portable_kernels_light_the_same_pictures(tmp_path: Path):
+    ours, portable = lit_pictures(), drawn_portably("lit_pictures", tmp_path)
+    assert sorted(portable) == sorted(ours)
     for name, picture in ours.items():
-        off = np.abs(picture - portable[1][name])
+        off = np.abs(picture - portable[name])
         assert picture[:, 3].max() > 0.5, name
         assert off.max() < (PORTABLE_2D if "shapes" in name else PORTABLE_LIT), name
 
