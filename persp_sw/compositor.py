@@ -22,7 +22,7 @@ from .geometry.view import Eye
 from .kernels.composite import Rays
 from .kernels.composite import composite as composite_face
 from .kernels.scanline import Level
-from .kernels.tables import IntegralTable, LitIntegralTable, LitTable, Table
+from .kernels.tables import AnyTable, IntegralTable, LitIntegralTable, LitTable, Table
 from .optics.appearance import Appearance
 from .optics.shading import shade_of
 from .planning import EyePlan
@@ -67,15 +67,15 @@ def composite_eye(
     images = [image.face_pixels(number) for number in range(len(faces))]
     sampling = choose_sampling(settings, appearance.classification, volume)
     reach = ceil(appearance.look.gradient_distance) if appearance.asks_gradients else 0
-    level = cache(
-        partial(_level, detail, reach)
-    )  # zones, opposite faces and steps of depth have them in common
+    # Zones, opposite faces and steps of depth have these in common.
+    level = cache(partial(_level, detail, reach))
+    table = cache(partial(_table, appearance, sampling.preintegrated, volume))
 
     def between(faces: Sequence[Face], images: Sequence[Image], nearest: float, farthest: float) -> int:
         limits = nearest, farthest
         return sum(
             _composite(
-                detail, level, appearance, part, settings, sampling, eye, geometry.eye, face,
+                detail, level, table, part, settings, sampling, eye, geometry.eye, face,
                 plan.own_rays, threads, limits, cancel, out,
             )
             for face, out in zip(faces, images, strict=True)
@@ -93,7 +93,7 @@ def composite_eye(
 def _composite(
     detail: DetailStore,
     level: Callable[[int, int, Part, bool], Level],
-    appearance: Appearance,
+    table: Callable[[int], AnyTable],
     part: Part,
     settings: Settings,
     sampling: Sampling,
@@ -137,7 +137,6 @@ def _composite(
         ]
     )
     half_spaces = part.half_spaces[:, [*axes, 3]]
-    table = _table(appearance, preintegrated, volume, axes)
     pairs = per_interval > 1 or preintegrated
     samples = np.zeros(out.shape[0], np.int64)
     taken = 0
@@ -162,7 +161,7 @@ def _composite(
             per_interval,
             fine,
             coarse,
-            table,
+            table(face.axis),
             np.float32(settings.residual),
             threads,
             cancel.flag,
@@ -174,10 +173,8 @@ def _composite(
     return taken
 
 
-def _table(
-    appearance: Appearance, preintegrated: bool, volume: Volume, axes: list[int]
-) -> Table | IntegralTable | LitTable | LitIntegralTable:
-    """What kernels need of a transfer function and its look, in the standard space of these axes."""
+def _table(appearance: Appearance, preintegrated: bool, volume: Volume, axis: int) -> AnyTable:
+    """What kernels need of a transfer function and its look, in standard space of principal axis `axis`."""
     classification, look, shadows = appearance
     mapping = np.float32(classification.origin), np.float32(classification.scale)
     table: Table | IntegralTable = Table(classification.rows, *mapping)
@@ -187,7 +184,7 @@ def _table(
         table = IntegralTable(integrals.sums, integrals.beyond, *mapping, *numbers)
     if not appearance.asks_gradients:
         return table
-    shade = shade_of(look, volume, axes, classification, shadows)
+    shade = shade_of(look, volume, list(STANDARD_AXES[axis]), classification, shadows)
     if preintegrated:
         return LitIntegralTable(*table, *shade)
     return LitTable(*table, (classification.table[:, 3] > 0).astype(np.uint8), *shade)

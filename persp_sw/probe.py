@@ -17,7 +17,8 @@ from .geometry.view import Eye, View
 from .kernels import march
 from .kernels.march import composite_rays, hit_rays
 from .optics.classification2d import classify
-from .optics.look import Look, Modulation
+from .optics.look import Look
+from .optics.shading import weights_of
 from .optics.transfer import TransferFunction
 from .optics.transfer2d import TransferFunction2D
 from .volume.gradient import largest_magnitude, world_from_differences
@@ -113,13 +114,13 @@ class Probe:
         classification, lift = classify(transfer, volume), lift_exponent(volume)
         rows = classification.rows.astype(np.float64).reshape(classification.magnitudes, -1, 4)[:, 1:]
         rows[..., :3] *= rows[..., 3:]
-        self._sums = np.concatenate([np.zeros((len(rows), 1, 4)), np.cumsum(rows, 1)], 1)
-        self._gradient = _gradient_of(volume, self.look)
-        self._gradient[march.PER_MAGNITUDE] = np.ldexp(classification.per_magnitude, lift)
+        sums = np.concatenate([np.zeros((len(rows), 1, 4)), np.cumsum(rows, 1)], 1)
+        gradient = _gradient_of(volume, self.look)
+        gradient[march.PER_MAGNITUDE] = np.ldexp(classification.per_magnitude, lift)
         if classification.magnitudes > 1:
-            self._gradient[march.REACH] = self.look.gradient_distance
-        self._origin = float(np.ldexp(classification.origin, -lift))
-        self._scale = float(np.ldexp(classification.scale, lift))
+            gradient[march.REACH] = self.look.gradient_distance
+        origin, scale = np.ldexp(classification.origin, -lift), np.ldexp(classification.scale, lift)
+        self._field = volume.data, sums, float(origin), float(scale), gradient  # as `march` takes it
         self._object_from_world = np.linalg.inv(volume.world_from_object)
 
     @classmethod
@@ -163,11 +164,7 @@ class Probe:
         rows, ends = self._parts(source)
         _jit.set_threads(self.threads)
         composite_rays(
-            self.volume.data,
-            self._sums,
-            self._origin,
-            self._scale,
-            self._gradient,
+            *self._field,
             rows,
             ends,
             rays,
@@ -239,11 +236,7 @@ class Probe:
         out = np.empty((1, 3))
         _jit.set_threads(1)
         hit_rays(
-            self.volume.data,
-            self._sums,
-            self._origin,
-            self._scale,
-            self._gradient,
+            *self._field,
             rows,
             ends,
             rays,
@@ -280,11 +273,7 @@ def _gradient_of(volume: Volume, look: Look) -> NDArray[np.float64]:
     """What kernels need of gradients; no reach where the look does not ask for any."""
     numbers = np.zeros(march.GRADIENT)
     numbers[:9] = world_from_differences(volume).ravel()
-    modulation = look.modulation or Modulation(opacity=0, colour=0)
-    largest = largest_magnitude(volume, look.gradient_distance)
-    if largest > 0:
-        numbers[march.LOW] = modulation.low * largest
-        numbers[march.PER_WEIGHT] = 1 / ((modulation.high - modulation.low) * largest)
-    numbers[march.THICKENED], numbers[march.COLOURED] = modulation.opacity, modulation.colour
+    weights = march.LOW, march.PER_WEIGHT, march.THICKENED, march.COLOURED
+    numbers[list(weights)] = weights_of(look.modulation, largest_magnitude(volume, look.gradient_distance))
     numbers[march.REACH] = 0.0 if look.modulation is None else look.gradient_distance
     return numbers

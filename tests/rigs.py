@@ -11,6 +11,36 @@ from vr_plugin.rigs.file import rig_of_keys
 CONFIGS = ROOT / "configs"
 
 
+_TWO_WALLS = """
+[[wall]]
+name = "front"
+lower_left = [-1.5, 0, -1.5]
+lower_right = [1.5, 0, -1.5]
+upper_left = [-1.5, 3, -1.5]
+pixels = PIXELS
+stereo = "quad"
+
+[[wall]]
+name = "floor"
+lower_left = [-1.5, 0, 1.5]
+lower_right = [1.5, 0, 1.5]
+upper_left = [-1.5, 0, -1.5]
+pixels = PIXELS
+stereo = "quad"
+
+[eyes]
+rest_pose = { position = [0, 1.7, 1.0], look = [0, 0, -1] }
+
+[world]
+centre = [0, 1.2, 0]
+"""
+
+
+def two_walls(pixels: int) -> str:
+    """A rig file: a front wall and a floor, quad-buffered, so many pixels along each edge."""
+    return _TWO_WALLS.replace("PIXELS", str([pixels, pixels]))
+
+
 def wall_keys(name: str = "front", **others: object) -> dict:
     """A good [[wall]]: 2 × 2 m, 2 m before the viewer."""
     keys = {

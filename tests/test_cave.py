@@ -10,7 +10,8 @@ import pytest
 import samples
 from click.testing import CliRunner
 from data_folder import DATA
-from rigs import CONFIGS
+from rigs import CONFIGS, two_walls
+from tracker_samples import Script
 
 import persp_sw as psw
 from vr_plugin.commands.cave import cave
@@ -19,29 +20,7 @@ from vr_plugin.pose import Pose
 from vr_plugin.rigs.file import load_rig
 from vr_plugin.trackers import Sample
 
-RIG = """
-[[wall]]
-name = "front"
-lower_left = [-1.5, 0, -1.5]
-lower_right = [1.5, 0, -1.5]
-upper_left = [-1.5, 3, -1.5]
-pixels = [64, 64]
-stereo = "quad"
-
-[[wall]]
-name = "floor"
-lower_left = [-1.5, 0, 1.5]
-lower_right = [1.5, 0, 1.5]
-upper_left = [-1.5, 0, -1.5]
-pixels = [64, 64]
-stereo = "quad"
-
-[eyes]
-rest_pose = { position = [0, 1.7, 1.0], look = [0, 0, -1] }
-
-[world]
-centre = [0, 1.2, 0]
-"""
+RIG = two_walls(64)
 PATH = "t,x,y,z,qx,qy,qz,qw\n" + "".join(
     f"{0.1 * n:.1f},{0.05 * n:.3f},1.6,{0.9 - 0.02 * n:.3f},0,0,0,1\n" for n in range(12)
 )
@@ -212,21 +191,6 @@ def test_without_a_screen_windows_are_refused_with_advice(files, monkeypatch):
         CliRunner().invoke(
             cave, [str(files / "rig.toml"), scene], catch_exceptions=False, standalone_mode=False
         )
-
-
-class Script:
-    """A tracker that says what a test wrote down."""
-
-    status = "scripted"
-
-    def __init__(self, *batches):
-        self.batches = list(batches)
-
-    def poll(self, now):
-        return self.batches.pop(0) if self.batches else []
-
-    def close(self):
-        pass
 
 
 def loop_of(files: Path, tracker, wand: int | None = None) -> Loop:

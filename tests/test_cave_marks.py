@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from rigs import two_walls
 from tolerances import MARK_OPENGL, MATRIX
-from tracker_samples import random_pose
+from tracker_samples import Script, random_pose
 
 import persp_sw as psw
 from vr_plugin.cave.wall_marks import WallMarks
@@ -21,45 +22,8 @@ from vr_plugin.pose import Pose
 from vr_plugin.rigs.file import load_rig
 from vr_plugin.trackers import Sample, Wand
 
-RIG = """
-[[wall]]
-name = "front"
-lower_left = [-1.5, 0, -1.5]
-lower_right = [1.5, 0, -1.5]
-upper_left = [-1.5, 3, -1.5]
-pixels = [96, 96]
-stereo = "quad"
-
-[[wall]]
-name = "floor"
-lower_left = [-1.5, 0, 1.5]
-lower_right = [1.5, 0, 1.5]
-upper_left = [-1.5, 0, -1.5]
-pixels = [96, 96]
-stereo = "quad"
-
-[eyes]
-rest_pose = { position = [0, 1.7, 1.0], look = [0, 0, -1] }
-
-[world]
-centre = [0, 1.2, 0]
-"""
+RIG = two_walls(96)
 BOX = psw.marks.MarkChoice(box=True, axes=True)
-
-
-class Script:
-    """A tracker that says what a test wrote down."""
-
-    status = "scripted"
-
-    def __init__(self, *batches):
-        self.batches = list(batches)
-
-    def poll(self, now):
-        return self.batches.pop(0) if self.batches else []
-
-    def close(self):
-        pass
 
 
 @pytest.fixture

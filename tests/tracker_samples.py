@@ -14,6 +14,21 @@ from vr_plugin.trackers import vrpn_wire as wire
 TYPES = (wire.POSE, "vrpn_Tracker Velocity", wire.BUTTON, wire.BUTTONS, wire.AXES, wire.PONG)
 
 
+class Script:
+    """A tracker that says what a test wrote down."""
+
+    status = "scripted"
+
+    def __init__(self, *batches):
+        self.batches = list(batches)
+
+    def poll(self, now):
+        return self.batches.pop(0) if self.batches else []
+
+    def close(self):
+        pass
+
+
 def random_pose(rng: np.random.Generator) -> Pose:
     """Within a few metres, turned at random."""
     return Pose(rng.normal(size=3), rng.normal(size=4))

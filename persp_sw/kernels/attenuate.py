@@ -3,46 +3,8 @@
 import numpy as np
 
 from .._jit import kernel, parallel_kernel, prange
+from .dense import magnitude_at
 from .phong import LOW, MAGNITUDES, PER_MAGNITUDE, PER_WEIGHT, REACH, ROWS, THICKENED
-
-
-@kernel
-def _value(voxels, x, y, z):
-    """Trilinear at a place, clamped to the voxels."""
-    n_z, n_y, n_x = voxels.shape
-    x, y, z = min(max(x, 0.0), n_x - 1.0), min(max(y, 0.0), n_y - 1.0), min(max(z, 0.0), n_z - 1.0)
-    i, j, k = min(int(x), n_x - 2), min(int(y), n_y - 2), min(int(z), n_z - 2)
-    x, y, z = x - i, y - j, z - k
-    result = 0.0
-    for c in range(2):
-        for b in range(2):
-            row = voxels[k + c, j + b]
-            value = np.float64(row[i]) * (1.0 - x) + np.float64(row[i + 1]) * x
-            result += value * (y if b else 1.0 - y) * (z if c else 1.0 - z)
-    return result
-
-
-@kernel
-def _difference(voxels, x, y, z, axis, reach):
-    """Central difference a voxel; neighbours where the volume ends are as far apart as they are."""
-    place, last = (x, y, z)[axis], voxels.shape[2 - axis] - 1.0
-    low, high = max(place - reach, 0.0), min(place + reach, last)
-    a, b = low - place, high - place
-    one = _value(voxels, x + a * (axis == 0), y + a * (axis == 1), z + a * (axis == 2))
-    other = _value(voxels, x + b * (axis == 0), y + b * (axis == 1), z + b * (axis == 2))
-    return (other - one) / (high - low)
-
-
-@kernel
-def _magnitude(voxels, x, y, z, matrix, reach):
-    """Of the gradient in the world; 0 where there is none."""
-    square = 0.0
-    g_x = _difference(voxels, x, y, z, 0, reach)
-    g_y = _difference(voxels, x, y, z, 1, reach)
-    g_z = _difference(voxels, x, y, z, 2, reach)
-    for row in range(3):
-        square += (matrix[row, 0] * g_x + matrix[row, 1] * g_y + matrix[row, 2] * g_z) ** 2
-    return np.sqrt(square) if square == square else 0.0
 
 
 @parallel_kernel
@@ -61,6 +23,7 @@ def coarse_extinction(voxels, rows, origin, scale, last, matrix, numbers, factor
         float32 [z, y, x], overwritten: ⌈(n − 1) / factor⌉ + 1 along an axis of n voxels.
     """
     n_z, n_y, n_x = voxels.shape
+    flat = matrix.ravel()
     graded = numbers[THICKENED] != 0.0 or numbers[MAGNITUDES] > 1.0
     for k in prange(out.shape[0]):
         plane = np.zeros((out.shape[1], out.shape[2]))
@@ -76,7 +39,7 @@ def coarse_extinction(voxels, rows, origin, scale, last, matrix, numbers, factor
                         row = int(min(max((value - origin) * scale + 1.5, 1.0), float(last)))
                         thicker = 1.0
                         if graded:
-                            m = _magnitude(voxels, float(x), float(y), float(z), matrix, numbers[REACH])
+                            m = magnitude_at(voxels, float(x), float(y), float(z), flat, numbers[REACH])
                             share = min(max((m - numbers[LOW]) * numbers[PER_WEIGHT], 0.0), 1.0)
                             thicker = 1.0 - numbers[THICKENED] + numbers[THICKENED] * share
                             skipped = min(

@@ -3,6 +3,7 @@
 import numpy as np
 
 from .._jit import kernel, parallel_kernel, prange
+from .dense import value_at
 
 # `face`: float64, see `count_samples`.
 E_I, E_J, E_K, SIGN, NEAR, RESIDUAL, OPACITY_UNIT, MAX_OPACITY = range(8)
@@ -21,22 +22,6 @@ def _opacity(value, points):
             weight = (value - points[n, 0]) / (points[n + 1, 0] - points[n, 0])
             return points[n, 1] * (1.0 - weight) + points[n + 1, 1] * weight
     return 0.0
-
-
-@kernel
-def _trilinear(rows, i, j, k):
-    """The value at (i, j, k), clamped to the grid; `rows` is [j, k, i]."""
-    n_j, n_k, n_i = rows.shape
-    i, j, k = min(max(i, 0.0), n_i - 1.0), min(max(j, 0.0), n_j - 1.0), min(max(k, 0.0), n_k - 1.0)
-    i0, j0, k0 = min(np.int64(i), n_i - 2), min(np.int64(j), n_j - 2), min(np.int64(k), n_k - 2)
-    a, b, c = i - i0, j - j0, k - k0
-    value = 0.0
-    for dj in range(2):
-        for dk in range(2):
-            weight = (b if dj else 1.0 - b) * (c if dk else 1.0 - c)
-            low, high = np.float64(rows[j0 + dj, k0 + dk, i0]), np.float64(rows[j0 + dj, k0 + dk, i0 + 1])
-            value += weight * (low * (1.0 - a) + high * a)
-    return value
 
 
 @kernel
@@ -67,7 +52,7 @@ def _count_ray(t_i, t_j, steps, length, face, half_spaces, points, rows):
             continue
         if transparency <= face[RESIDUAL]:
             break
-        value = _trilinear(rows, eye_i + t_i * distance, eye_j + t_j * distance, eye_k + sign * distance)
+        value = value_at(rows, eye_i + t_i * distance, eye_k + sign * distance, eye_j + t_j * distance)
         opacity = _opacity(value, points)
         if opacity > 0.0:
             count += 1

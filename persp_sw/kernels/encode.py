@@ -16,6 +16,8 @@ from .._jit import bits_of, inlined_kernel, kernel, parallel_kernel, popcount, p
 
 BLOCK = 4  # cells in a block
 WORD = 64  # blocks in a word
+# Packed voxels are read in vectors that may begin before a run and end after it.
+PADDING = 128
 
 _NONE, _ONE, _TWO = np.uint64(0), np.uint64(1), np.uint64(2)
 _LAST = np.uint64(WORD - 1)

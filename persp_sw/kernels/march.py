@@ -9,6 +9,7 @@ values between two samples is not missed.
 import numpy as np
 
 from .._jit import kernel, parallel_kernel, prange
+from .dense import magnitude_at, value_at
 
 # Columns of `sums`, and of a ray.
 _EXTINCTION = 3
@@ -22,56 +23,10 @@ _ALIKE = 1e-6
 
 
 @kernel
-def _value(voxels, x, y, z):
-    """The trilinear value at a place, clamped to the box; NaN where a voxel around it has none."""
-    n_z, n_y, n_x = voxels.shape
-    x, y, z = min(max(x, 0.0), n_x - 1.0), min(max(y, 0.0), n_y - 1.0), min(max(z, 0.0), n_z - 1.0)
-    i, j, k = min(int(x), n_x - 2), min(int(y), n_y - 2), min(int(z), n_z - 2)
-    x, y, z = x - i, y - j, z - k
-    near = (1 - y) * ((1 - x) * np.float64(voxels[k, j, i]) + x * np.float64(voxels[k, j, i + 1])) + y * (
-        (1 - x) * np.float64(voxels[k, j + 1, i]) + x * np.float64(voxels[k, j + 1, i + 1])
-    )
-    far = (1 - y) * (
-        (1 - x) * np.float64(voxels[k + 1, j, i]) + x * np.float64(voxels[k + 1, j, i + 1])
-    ) + y * ((1 - x) * np.float64(voxels[k + 1, j + 1, i]) + x * np.float64(voxels[k + 1, j + 1, i + 1]))
-    return (1 - z) * near + z * far
-
-
-@kernel
-def _value_at(voxels, ray, distance):
+def _value_on(voxels, ray, distance):
     """The value at a distance along a ray."""
-    return _value(voxels, ray[0] + distance * ray[3], ray[1] + distance * ray[4], ray[2] + distance * ray[5])
-
-
-@kernel
-def _slope(voxels, x, y, z, axis, reach):
-    """Difference of the values `reach` to both sides along an axis, both in the box, by what lies between."""
-    last = voxels.shape[2 - axis] - 1.0
-    here = x if axis == 0 else y if axis == 1 else z
-    here = min(max(here, 0.0), last)
-    below, above = max(here - reach, 0.0), min(here + reach, last)
-    if axis == 0:
-        rise = _value(voxels, above, y, z) - _value(voxels, below, y, z)
-    elif axis == 1:
-        rise = _value(voxels, x, above, z) - _value(voxels, x, below, z)
-    else:
-        rise = _value(voxels, x, y, above) - _value(voxels, x, y, below)
-    return rise / (above - below)
-
-
-@kernel
-def _magnitude(voxels, ray, distance, gradient):
-    """Length of the gradient at a distance along a ray, per world unit; 0 where a value is missing."""
     x, y, z = ray[0] + distance * ray[3], ray[1] + distance * ray[4], ray[2] + distance * ray[5]
-    reach = gradient[REACH]
-    a = _slope(voxels, x, y, z, 0, reach)
-    b = _slope(voxels, x, y, z, 1, reach)
-    c = _slope(voxels, x, y, z, 2, reach)
-    total = 0.0
-    for n in range(3):
-        part = gradient[3 * n] * a + gradient[3 * n + 1] * b + gradient[3 * n + 2] * c
-        total += part * part
-    return np.sqrt(total) if total == total else 0.0
+    return value_at(voxels, x, y, z)
 
 
 @kernel
@@ -79,7 +34,8 @@ def _piece(voxels, ray, sums, gradient, middle, here, there, mean):
     """mean[0 … 3]: extinction · colour and extinction of a piece of a ray between two places in the table."""
     table, thickened, coloured = 0, 1.0, 1.0
     if gradient[REACH] > 0:
-        magnitude = _magnitude(voxels, ray, middle, gradient)
+        x, y, z = ray[0] + middle * ray[3], ray[1] + middle * ray[4], ray[2] + middle * ray[5]
+        magnitude = magnitude_at(voxels, x, y, z, gradient, gradient[REACH])
         table = min(int(magnitude * gradient[PER_MAGNITUDE] + 0.5), sums.shape[0] - 1)
         weight = min(max((magnitude - gradient[LOW]) * gradient[PER_WEIGHT], 0.0), 1.0)
         thickened = 1 - gradient[THICKENED] + gradient[THICKENED] * weight
@@ -166,9 +122,9 @@ def composite_rays(voxels, sums, origin, scale, gradient, rows, ends, rays, step
                 continue
             count = int(np.ceil((far - near) / step))
             length = (far - near) / count
-            here = (_value_at(voxels, ray, near) - origin) * scale + 0.5
+            here = (_value_on(voxels, ray, near) - origin) * scale + 0.5
             for n in range(count):
-                there = (_value_at(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
+                there = (_value_on(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
                 if here == here and there == there:
                     _piece(voxels, ray, sums, gradient, near + (n + 0.5) * length, here, there, mean)
                     if mean[_EXTINCTION] > 0:
@@ -211,9 +167,9 @@ def hit_rays(voxels, sums, origin, scale, gradient, rows, ends, rays, step, thre
             count = int(np.ceil((far - near) / step))
             length = (far - near) / count
             before = clear  # what was left a piece before
-            here = (_value_at(voxels, ray, near) - origin) * scale + 0.5
+            here = (_value_on(voxels, ray, near) - origin) * scale + 0.5
             for n in range(count):
-                there = (_value_at(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
+                there = (_value_on(voxels, ray, near + (n + 1) * length) - origin) * scale + 0.5
                 begin = near + n * length
                 after = clear * _through(voxels, ray, sums, gradient, begin, length, here, there, mean)
                 if after <= enough:
@@ -222,18 +178,18 @@ def hit_rays(voxels, sums, origin, scale, gradient, rows, ends, rays, step, thre
                     after = before if n else clear
                     fine = length / FINER
                     begin = near + start * length
-                    one = (_value_at(voxels, ray, begin) - origin) * scale + 0.5
+                    one = (_value_on(voxels, ray, begin) - origin) * scale + 0.5
                     for m in range((n + 1 - start) * FINER):
                         if m == (n - start) * FINER:
                             clear = after
-                        end = (_value_at(voxels, ray, begin + (m + 1) * fine) - origin) * scale + 0.5
+                        end = (_value_on(voxels, ray, begin + (m + 1) * fine) - origin) * scale + 0.5
                         at = begin + m * fine
                         through = _through(voxels, ray, sums, gradient, at, fine, one, end, mean)
                         if after * through <= enough:
                             part_of_it = np.log(after / enough) / -np.log(through) if through > 0 else 0.0
                             distance = begin + (m + part_of_it) * fine
                             out[r, 0], out[r, 2] = distance, threshold
-                            out[r, 1] = _value_at(voxels, ray, distance)
+                            out[r, 1] = _value_on(voxels, ray, distance)
                             after = 0.0
                             break
                         after *= through

@@ -39,6 +39,13 @@ def reach_of(table):
     raise NotImplementedError
 
 
+def shows(n, table, cells, lanes, at, section):
+    """Whether any of a packet's samples shows anything to a ray that goes on; `table`: a lit one. Compiled
+    code only.
+    """
+    raise NotImplementedError
+
+
 def illuminate(
     n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
     light, sample_at,
@@ -110,23 +117,11 @@ def _no_light(
 
 
 @inlined_kernel
-def _light_classified(
+def _light(
     n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
     light, sample_at,
 ):  # fmt: skip
-    if shows_classified(n, table, cells, lanes, np.uint64(at), section):
-        light_up(
-            n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
-            np.uint64(at), light, sample_at,
-        )  # fmt: skip
-
-
-@inlined_kernel
-def _light_integrated(
-    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
-    light, sample_at,
-):  # fmt: skip
-    if shows_integrated(n, table, cells, lanes, np.uint64(at), section):
+    if shows(n, table, cells, lanes, np.uint64(at), section):
         light_up(
             n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
             np.uint64(at), light, sample_at,
@@ -151,12 +146,17 @@ def _choose_reach(table):
     return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_reach)
 
 
+@kernel_by_type(shows)
+def _choose_shows(n, table, cells, lanes, at, section):
+    return shows_integrated if table.instance_class is LitIntegralTable else shows_classified
+
+
 @kernel_by_type(illuminate)
 def _choose_light(
     n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
     light, sample_at,
 ):  # fmt: skip
-    return _by_kind(table, _no_light, _no_light, _light_classified, _light_integrated)
+    return _by_kind(table, _no_light, _no_light, _light, _light)
 
 
 @kernel_by_type(blend)

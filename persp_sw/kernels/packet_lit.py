@@ -8,6 +8,7 @@ far apart they are.
 import numpy as np
 
 from .._jit import VECTORS, inlined_kernel, lean_kernel
+from .encode import PADDING
 from .packet_portable import WINDOW
 from .phong import PER_SHADOW, REACH, SHADOW, START
 from .scanline import ROUNDING
@@ -25,7 +26,6 @@ __all__ = ["light_up", "shows_classified", "shows_integrated"]
 
 _F = np.float32
 _NONE = np.uint64(0)
-_BEFORE = 128  # `volume.runs.PADDING`
 _ALL = _F(1 / 65535)
 
 
@@ -47,7 +47,7 @@ def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cell
     y = min(max((y * level.factor[1] + one[START + 1]) * per, 0.0), n_j - 1.0)
     z = min(max((z * level.factor[2] + one[START + 2]) * per, 0.0), n_k - 1.0)
     j, k = min(np.int64(y), n_j - 2), min(np.int64(z), n_k - 2)
-    at_00 = _BEFORE + ((shadow * n_j + j) * n_k + k) * n_i
+    at_00 = PADDING + ((shadow * n_j + j) * n_k + k) * n_i
     first = np.int64(min(max(x_0, low), high))
     end = min(np.int64(min(max(x_0 + (TILE - 1) * step, low), high) + ROUNDING) + 1, n_i - 1)
     first = min(first, end - 1)

@@ -67,7 +67,7 @@ class Shade(NamedTuple):
         float32 (3, 3): −A⁻ᵀ, and A.
     shadows, shadow_size
         How much is left of lights that cast shadows, 65535 for all: uint16, [light, j, k, i] in one line,
-        `volume.runs.PADDING` before and after it; int64 (3,): how many along i, j and k.
+        `encode.PADDING` before and after it; int64 (3,): how many along i, j and k.
     """
 
     numbers: np.ndarray

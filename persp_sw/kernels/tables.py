@@ -3,7 +3,7 @@
 They are flat, for numba hands no nested tuples to threads.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -65,3 +65,6 @@ class LitIntegralTable(NamedTuple):
     world_from_standard: np.ndarray
     shadows: np.ndarray
     shadow_size: np.ndarray
+
+
+AnyTable: TypeAlias = Table | IntegralTable | LitTable | LitIntegralTable

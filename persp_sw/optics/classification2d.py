@@ -35,8 +35,8 @@ class Classification2D(Classification):
     per_magnitude
         Of magnitudes a world unit, of values as `volume.lift` brings them near 1.
 
-    Accuracy: nearest entry; the error is at most half a grey level / 2 of 8-bit values, 1/1016 of the shapes'
-    extent of others, and 1/252 of their largest magnitude.
+    Accuracy: nearest entry; the error is at most a quarter of a grey level of 8-bit values, 1/1016 of the
+    shapes' extent of others, and 1/252 of their largest magnitude.
     """
 
     all_rows: NDArray[np.float32]

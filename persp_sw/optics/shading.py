@@ -20,6 +20,18 @@ if TYPE_CHECKING:
     from .shadows import Shadows
 
 
+def weights_of(modulation: Modulation | None, largest: float) -> tuple[float, float, float, float]:
+    """A modulation as kernels take it: lowest magnitude, weight a magnitude, shares of extinction and colour.
+
+    `largest`: the longest gradient possible, in the unit that magnitudes are told in.
+    """
+    modulation = modulation or Modulation(opacity=0, colour=0)
+    shares = modulation.opacity, modulation.colour
+    if not largest > 0:
+        return 0.0, 0.0, *shares
+    return modulation.low * largest, 1 / ((modulation.high - modulation.low) * largest), *shares
+
+
 def shade_of(
     look: Look,
     volume: Volume,
@@ -31,16 +43,14 @@ def shade_of(
 
     Kernels see values as `volume.lift` brings them near 1, and so do these numbers.
     """
-    lighting, modulation = look.lighting, look.modulation or Modulation(opacity=0, colour=0)
+    lighting = look.lighting
     largest = float(np.ldexp(largest_magnitude(volume, look.gradient_distance), lift_exponent(volume)))
     numbers = np.zeros(phong.NUMBERS, np.float32)
     numbers[phong.REACH] = look.gradient_distance
     # No gradient at all has no normal, but must not divide by zero.
     numbers[phong.FAINT] = max((FAINTEST * largest) ** 2, float(np.finfo(np.float32).tiny))
-    if largest > 0:
-        numbers[phong.LOW] = modulation.low * largest
-        numbers[phong.PER_WEIGHT] = 1 / ((modulation.high - modulation.low) * largest)
-    numbers[phong.THICKENED], numbers[phong.COLOURED] = modulation.opacity, modulation.colour
+    weights = phong.LOW, phong.PER_WEIGHT, phong.THICKENED, phong.COLOURED
+    numbers[list(weights)] = weights_of(look.modulation, largest)
     numbers[phong.ROWS], numbers[phong.MAGNITUDES] = len(classification.table), classification.magnitudes
     numbers[phong.PER_MAGNITUDE] = classification.per_magnitude
     numbers[phong.OWN] = 1.0 if lighting is None else lighting.emissive + lighting.ambient

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from ..geometry.parts import shown_parts
 from ..geometry.regions import Regions, box_rows
 from ..kernels import attenuate
+from ..kernels.encode import PADDING
 from ..volume.grid import Volume
 from ..volume.lift import lifted
-from ..volume.runs import PADDING
 from .classification import Classification
 from .look import Look
 from .shading import shade_of

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 from .. import _jit
 from ..arrays import Voxels
 from ..kernels import encode
+from ..kernels.encode import PADDING
 from .grid import Volume
 from .levels import BlockBounds, standard_rows
 from .visibility import Visibility, visible_intervals
-
-# Packed voxels are read in vectors that may begin before a run and end after it.
-PADDING = 128
 
 _PACK = {0: encode.pack_along_y, 1: encode.pack_along_z, 2: encode.pack_along_x}
 

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 import persp_sw as psw
-from persp_sw.errors import TransferFunctionError
 
-from .history import History
+from .function_edit import FunctionEdit
 
 _LEAST = 1e-6  # of the limits: the least size of a shape
 
@@ -95,7 +94,7 @@ def shape_like(
     return reshaped(psw.Triangle(value, rest[0], width, *rest[1:]), "middle", by, limits)
 
 
-class ShapeEdit:
+class ShapeEdit(FunctionEdit[psw.TransferFunction2D]):
     """An editor's state.
 
     Parameters
@@ -112,26 +111,9 @@ class ShapeEdit:
     """
 
     def __init__(self, transfer: psw.TransferFunction2D, limits: tuple[float, float, float]):
+        super().__init__(transfer)
         self.limits = limits
-        self.selected: int | None = None
-        self._history = History(transfer)
-        self._gestures = 0
-        self._held: tuple[str, tuple[float, float], psw.Box | psw.Triangle] | None = None
-
-    @property
-    def transfer(self) -> psw.TransferFunction2D:
-        """As edited so far."""
-        return self._history.now
-
-    @property
-    def history(self) -> History[psw.TransferFunction2D]:
-        """What can be undone."""
-        return self._history
-
-    @property
-    def is_dragging(self) -> bool:
-        """Whether a part of a shape is held."""
-        return self._held is not None
+        self._held: tuple[str, tuple[float, float], psw.Box | psw.Triangle] | None
 
     def grip_at(self, value: float, magnitude: float, reach: tuple[float, float]) -> tuple[int, str] | None:
         """Shape and part nearest to a place, within `reach` (values, magnitudes: radii of an ellipse)."""
@@ -211,15 +193,6 @@ class ShapeEdit:
         """One step forward again."""
         self.selected = self._held = None
         self._history.redo()
-
-    def save(self, path: str | Path) -> None:
-        """`TransferFunction2D.save`; TransferFunctionError where the disk refuses."""
-        try:
-            self.transfer.save(path)
-        except OSError as error:
-            raise TransferFunctionError(
-                f"cannot write the transfer function {path}: {error.strerror}"
-            ) from None
 
     def load(self, path: str | Path) -> None:
         """`TransferFunction2D.load`, as a step that can be undone; TransferFunctionError where it is none."""

@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 
 import persp_sw as psw
-from persp_sw.errors import TransferFunctionError
 
-from .history import History
+from .function_edit import FunctionEdit
 
 Axis = psw.editing.OpacityAxis
 
 
-class TransferEdit:
+class TransferEdit(FunctionEdit[psw.TransferFunction]):
     """An editor's state.
 
     Parameters
@@ -45,26 +44,9 @@ class TransferEdit:
         limits: tuple[float, float],
         axis: Axis = psw.editing.LOGARITHMIC,
     ):
+        super().__init__(transfer)
         self.axis, self.limits = axis, limits
-        self.selected: int | None = None
-        self._history = History(transfer)
-        self._gestures = 0
-        self._held: tuple[float, float] | None = None  # from the pointer to the point that it drags
-
-    @property
-    def transfer(self) -> psw.TransferFunction:
-        """As edited so far."""
-        return self._history.now
-
-    @property
-    def history(self) -> History[psw.TransferFunction]:
-        """What can be undone."""
-        return self._history
-
-    @property
-    def is_dragging(self) -> bool:
-        """Whether a point is held."""
-        return self._held is not None
+        self._held: tuple[float, float] | None  # from the pointer to the point that it drags
 
     def place(self, index: int) -> tuple[float, float]:
         """Value and position of a point."""
@@ -149,15 +131,6 @@ class TransferEdit:
     def redo(self) -> None:
         """One step forward again."""
         self._step(self._history.redo)
-
-    def save(self, path: str | Path) -> None:
-        """`TransferFunction.save`; TransferFunctionError where the disk refuses."""
-        try:
-            self.transfer.save(path)
-        except OSError as error:
-            raise TransferFunctionError(
-                f"cannot write the transfer function {path}: {error.strerror}"
-            ) from None
 
     def load(self, path: str | Path) -> None:
         """`TransferFunction.load`, as a step that can be undone; TransferFunctionError where it is none."""
