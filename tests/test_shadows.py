@@ -91,7 +91,8 @@ def extinction_of(volume, transfer, look):
         row = (value - classification.origin) * classification.scale + 1.5
         row = int(np.clip(row, 1, len(classification.table) - 1))
         slopes = lit_twins.slopes(volume.data, (x, y, z), look.gradient_distance)
-        magnitude = np.linalg.norm(shade.normal_from_slopes.astype(float) @ slopes)
+        linear = shade.numbers[phong.NORMAL_FROM_SLOPES :][:9].reshape(3, 3).astype(float)
+        magnitude = np.linalg.norm(linear @ slopes)
         weight = np.clip((magnitude - numbers[phong.LOW]) * numbers[phong.PER_WEIGHT], 0, 1)
         thicker = 1 - numbers[phong.THICKENED] + numbers[phong.THICKENED] * weight
         skipped = np.floor(magnitude * classification.per_magnitude + 0.5)
@@ -106,8 +107,7 @@ def coarse_extinction(volume, transfer, look, factor):
     out = np.full([-(-(n - 1) // factor) + 1 for n in volume.data.shape], np.nan, np.float32)
     attenuate.coarse_extinction(
         volume.data, classification.rows, classification.origin, classification.scale,
-        len(classification.table) - 1, shade.normal_from_slopes.astype(float), shade.numbers.astype(float),
-        factor, out,
+        len(classification.table) - 1, shade.numbers.astype(float), factor, out,
     )  # fmt: skip
     return out
 
@@ -258,13 +258,10 @@ def random_shade(rng, size=(150, 5, 6), lights=STARTS, per=1.0):
     """Two shadows of noise and three lights, the last without one; size and starts along i, j and k."""
     left = rng.integers(0, 65536, (2, *size[::-1])).astype(np.uint16)
     numbers, columns = np.zeros(phong.NUMBERS, np.float32), np.zeros((3, phong.LIGHT_COLUMNS), np.float32)
-    numbers[phong.PER_SHADOW] = per
+    numbers[phong.PER_SHADOW], numbers[phong.SHADOW_SIZE :][:3] = per, size
     for column, (number, start) in zip(columns, lights, strict=True):
         column[phong.SHADOW], column[phong.START :] = number, start
-    shade = phong.Shade(
-        numbers, np.zeros(6, np.float32), columns, *np.zeros((2, 3, 3), np.float32),
-        np.pad(left.transpose(0, 2, 1, 3).ravel(), PADDING), np.array(size),
-    )  # fmt: skip
+    shade = phong.Shade(numbers, columns, np.pad(left.transpose(0, 2, 1, 3).ravel(), PADDING))
     return shade, left  # [light, k, j, i]
 
 

@@ -4,11 +4,11 @@ import numpy as np
 
 from .._jit import kernel, parallel_kernel, prange
 from .dense import magnitude_at
-from .phong import LOW, MAGNITUDES, PER_MAGNITUDE, PER_WEIGHT, REACH, ROWS, THICKENED
+from .phong import LOW, MAGNITUDES, NORMAL_FROM_SLOPES, PER_MAGNITUDE, PER_WEIGHT, REACH, ROWS, THICKENED
 
 
 @parallel_kernel
-def coarse_extinction(voxels, rows, origin, scale, last, matrix, numbers, factor, out):
+def coarse_extinction(voxels, rows, origin, scale, last, numbers, factor, out):
     """Mean extinction around every `factor`-th voxel along each axis, by a tent that reaches to the next.
 
     Parameters
@@ -17,13 +17,13 @@ def coarse_extinction(voxels, rows, origin, scale, last, matrix, numbers, factor
         [z, y, x]; NaN has no extinction.
     rows, origin, scale, last
         A table's rows, how values find them, and the last row of one magnitude.
-    matrix, numbers
-        `normal_from_slopes` for the axes x, y, z and `numbers` of a `phong.Shade`.
+    numbers
+        Those of a `phong.Shade` for the axes x, y, z, as float64.
     out
         float32 [z, y, x], overwritten: ⌈(n − 1) / factor⌉ + 1 along an axis of n voxels.
     """
     n_z, n_y, n_x = voxels.shape
-    flat = matrix.ravel()
+    matrix = numbers[NORMAL_FROM_SLOPES:]
     graded = numbers[THICKENED] != 0.0 or numbers[MAGNITUDES] > 1.0
     for k in prange(out.shape[0]):
         plane = np.zeros((out.shape[1], out.shape[2]))
@@ -39,7 +39,7 @@ def coarse_extinction(voxels, rows, origin, scale, last, matrix, numbers, factor
                         row = int(min(max((value - origin) * scale + 1.5, 1.0), float(last)))
                         thicker = 1.0
                         if graded:
-                            m = magnitude_at(voxels, float(x), float(y), float(z), flat, numbers[REACH])
+                            m = magnitude_at(voxels, float(x), float(y), float(z), matrix, numbers[REACH])
                             share = min(max((m - numbers[LOW]) * numbers[PER_WEIGHT], 0.0), 1.0)
                             thicker = 1.0 - numbers[THICKENED] + numbers[THICKENED] * share
                             skipped = min(

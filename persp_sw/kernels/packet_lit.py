@@ -10,7 +10,7 @@ import numpy as np
 from .._jit import VECTORS, inlined_kernel, lean_kernel
 from .encode import PADDING
 from .packet_portable import WINDOW
-from .phong import PER_SHADOW, REACH, SHADOW, START
+from .phong import PER_SHADOW, REACH, SHADOW, SHADOW_SIZE, START
 from .scanline import ROUNDING
 from .state import LEFT, NEIGHBOURS, TILE
 
@@ -35,11 +35,13 @@ def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cell
     lefts, room = light + LEFT, light + NEIGHBOURS
     for l in range(np.uint64(n)):  # noqa: E741
         lanes[lefts + l] = _F(1.0)
-    one, size, per = shades.lights[number], shades.shadow_size, np.float64(shades.numbers[PER_SHADOW])
+    one, numbers = shades.lights[number], shades.numbers
+    per = np.float64(numbers[PER_SHADOW])
     shadow = np.int64(one[SHADOW])
     if shadow < 0:
         return
-    n_i, n_j, n_k = size[0], size[1], size[2]
+    n_i, n_j = np.int64(numbers[SHADOW_SIZE]), np.int64(numbers[SHADOW_SIZE + 1])
+    n_k = np.int64(numbers[SHADOW_SIZE + 2])
     x_0 = (x * level.factor[0] + one[START]) * per
     step = step * level.factor[0] * per
     low, high = (low * level.factor[0] + one[START]) * per, (high * level.factor[0] + one[START]) * per

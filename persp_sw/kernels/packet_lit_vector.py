@@ -195,18 +195,18 @@ _LIT, _SHINE = (LIT_RED, LIT_GREEN, LIT_BLUE), (SHINE_RED, SHINE_GREEN, SHINE_BL
 
 
 @intrinsic
-def _shade_rays(_context, numbers, matrix, frame, headlight, ray, slopes, lanes, at, light, sample):
+def _shade_rays(_context, numbers, ray, slopes, lanes, at, light, sample):
     def build(context, builder, signature, arguments):
         n = _numbers(context, builder, signature.args[0], arguments[0], phong.NUMBERS)
-        m = _numbers(context, builder, signature.args[1], arguments[1], 9)
-        a = _numbers(context, builder, signature.args[2], arguments[2], 9)
-        colours = _numbers(context, builder, signature.args[3], arguments[3], 6)
-        t_first, t_step, t_j, sign = (
-            simd.everywhere(builder, builder.extract_value(arguments[4], part)) for part in range(4)
+        m, a, colours = (
+            n[at:] for at in (phong.NORMAL_FROM_SLOPES, phong.WORLD_FROM_STANDARD, phong.HEADLIGHT)
         )
-        state = pointer(context, builder, signature.args[6], arguments[6])
-        at, light = arguments[7], arguments[8]
-        gradient = Tile(builder, state, arguments[5])
+        t_first, t_step, t_j, sign = (
+            simd.everywhere(builder, builder.extract_value(arguments[1], part)) for part in range(4)
+        )
+        state = pointer(context, builder, signature.args[3], arguments[3])
+        at, light = arguments[4], arguments[5]
+        gradient = Tile(builder, state, arguments[2])
         g = [gradient.read(TILE * axis) for axis in range(3)]
         there = (g[0] + g[1] + g[2]).is_number()
         g = [simd.where(there, slope, 0.0) for slope in g]
@@ -229,7 +229,7 @@ def _shade_rays(_context, numbers, matrix, frame, headlight, ray, slopes, lanes,
             room.write(along * per_length, int(DIRECTION) + TILE * r)
         magnitude = square.square_root()
         weight = ((magnitude - n[phong.LOW]) * n[phong.PER_WEIGHT]).at_least(0.0).at_most(1.0)
-        mine = Tile(builder, state, builder.add(light, arguments[9]))
+        mine = Tile(builder, state, builder.add(light, arguments[6]))
         mine.write(1.0 - n[phong.THICKENED] + n[phong.THICKENED] * weight, THICKER)
         skipped = (magnitude * n[phong.PER_MAGNITUDE] + 0.5).floor().at_most(n[phong.MAGNITUDES] - 1.0)
         mine.write(skipped * n[phong.ROWS], SKIPPED)
@@ -245,8 +245,7 @@ def _shade_rays(_context, numbers, matrix, frame, headlight, ray, slopes, lanes,
         return context.get_dummy_value()
 
     arguments = (
-        numbers, matrix, frame, headlight, types.UniTuple(types.float32, 4), types.int64, lanes,
-        *[types.int64] * 3,
+        numbers, types.UniTuple(types.float32, 4), types.int64, lanes, *[types.int64] * 3,
     )  # fmt: skip
     return types.void(*arguments), build
 
@@ -292,8 +291,7 @@ def _add_one(_context, numbers, lights, number, lanes, light, sample):
 def shade(n, ray, slopes, shades, lanes, at, light, sample):
     """See `phong.shade`."""
     _shade_rays(
-        shades.numbers, shades.normal_from_slopes, shades.world_from_standard, shades.headlight, ray,
-        np.int64(slopes), lanes, np.int64(at), np.int64(light), np.int64(sample),
+        shades.numbers, ray, np.int64(slopes), lanes, np.int64(at), np.int64(light), np.int64(sample),
     )  # fmt: skip
 
 

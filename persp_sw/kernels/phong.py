@@ -45,7 +45,7 @@ _L1, _L3, _L5, _L7 = LOG2_COEFFICIENTS
     REACH, OWN, POWER, TWO_SIDED, BLINN, FAINT, LOW, PER_WEIGHT, THICKENED, COLOURED, PER_MAGNITUDE, ROWS,
     MAGNITUDES, PER_SHADOW,
 ) = range(14)  # fmt: skip
-NUMBERS = 14
+SHADOW_SIZE, HEADLIGHT, NORMAL_FROM_SLOPES, WORLD_FROM_STANDARD, NUMBERS = 14, 17, 23, 32, 41
 # Columns of `Shade.lights`.
 DIFFUSE, SPECULAR, SHADOW, START, LIGHT_COLUMNS = 3, 6, 9, 10, 13
 
@@ -56,27 +56,22 @@ class Shade(NamedTuple):
     numbers
         float32 (NUMBERS,): voxels to the neighbours; what colours shine with by themselves; the highlights'
         power; whether normals turn towards the eye, whether highlights are Blinn's; ε²; a modulation's lowest
-        magnitude, weight a magnitude, and its shares of extinction and colour; table's rows of values, how
-        many of them for how many magnitudes, a row a magnitude; whether there are lights.
-    headlight
-        float32 (6,): diffuse and specular colour of the light at the eye.
+        magnitude, weight a magnitude, and its shares of extinction and colour; a magnitude of the table a
+        magnitude, the table's rows for each of them, and how many there are; places of shadows a voxel.
+        From SHADOW_SIZE: shadows' places along i, j and k. From HEADLIGHT: diffuse and specular colour of
+        the light at the eye. From NORMAL_FROM_SLOPES and WORLD_FROM_STANDARD, row by row: −A⁻ᵀ, and A. All
+        in one array, for each that is passed costs every packet some nanoseconds.
     lights
         float32 (n, LIGHT_COLUMNS): direction towards a light, world, its diffuse and specular colour, the
         number of its shadows or −1, and from where they count, voxels along i, j and k.
-    normal_from_slopes, world_from_standard
-        float32 (3, 3): −A⁻ᵀ, and A.
-    shadows, shadow_size
+    shadows
         How much is left of lights that cast shadows, 65535 for all: uint16, [light, j, k, i] in one line,
-        `encode.PADDING` before and after it; int64 (3,): how many along i, j and k.
+        `encode.PADDING` before and after it.
     """
 
     numbers: np.ndarray
-    headlight: np.ndarray
     lights: np.ndarray
-    normal_from_slopes: np.ndarray
-    world_from_standard: np.ndarray
     shadows: np.ndarray
-    shadow_size: np.ndarray
 
 
 @inlined_kernel
@@ -112,14 +107,15 @@ def shade(n, ray, slopes, shades, lanes, at, light, sample):
         Where the light's sections begin, and the sample's among them.
     """
     t_first, t_step, t_j, sign = ray
-    numbers, matrix, frame = shades.numbers, shades.normal_from_slopes, shades.world_from_standard
-    m00, m01, m02 = matrix[0, 0], matrix[0, 1], matrix[0, 2]
-    m10, m11, m12 = matrix[1, 0], matrix[1, 1], matrix[1, 2]
-    m20, m21, m22 = matrix[2, 0], matrix[2, 1], matrix[2, 2]
-    a0, a1, a2 = frame[0, 0], frame[1, 0], frame[2, 0]
-    b0 = frame[0, 1] * t_j + frame[0, 2] * sign
-    b1 = frame[1, 1] * t_j + frame[1, 2] * sign
-    b2 = frame[2, 1] * t_j + frame[2, 2] * sign
+    numbers = shades.numbers
+    matrix, frame = numbers[NORMAL_FROM_SLOPES:], numbers[WORLD_FROM_STANDARD:]
+    m00, m01, m02 = matrix[0], matrix[1], matrix[2]
+    m10, m11, m12 = matrix[3], matrix[4], matrix[5]
+    m20, m21, m22 = matrix[6], matrix[7], matrix[8]
+    a0, a1, a2 = frame[0], frame[3], frame[6]
+    b0 = frame[1] * t_j + frame[2] * sign
+    b1 = frame[4] * t_j + frame[5] * sign
+    b2 = frame[7] * t_j + frame[8] * sign
     faint, two_sided = numbers[FAINT], numbers[TWO_SIDED] != _F(0.0)
     low, per_weight = numbers[LOW], numbers[PER_WEIGHT]
     thickened, coloured = numbers[THICKENED], numbers[COLOURED]
@@ -172,7 +168,7 @@ def shade(n, ray, slopes, shades, lanes, at, light, sample):
         lanes[mine + SHINE_GREEN + l] = _F(0.0)
         lanes[mine + SHINE_BLUE + l] = _F(0.0)
     power, blinn = numbers[POWER], numbers[BLINN] != _F(0.0)
-    bright, shine = shades.headlight[:3], shades.headlight[3:]
+    bright, shine = numbers[HEADLIGHT:], numbers[HEADLIGHT + 3 :]
     for l in range(np.uint64(n)):  # noqa: E741
         cosine = lanes[cosines + l]
         cosine = cosine if cosine > _F(0.0) else _F(0.0)

@@ -40,12 +40,8 @@ class LitTable(NamedTuple):
     scale: np.float32
     seen: np.ndarray
     numbers: np.ndarray
-    headlight: np.ndarray
     lights: np.ndarray
-    normal_from_slopes: np.ndarray
-    world_from_standard: np.ndarray
     shadows: np.ndarray
-    shadow_size: np.ndarray
 
 
 class LitIntegralTable(NamedTuple):
@@ -59,12 +55,8 @@ class LitIntegralTable(NamedTuple):
     unit: np.float32
     steps: np.float32
     numbers: np.ndarray
-    headlight: np.ndarray
     lights: np.ndarray
-    normal_from_slopes: np.ndarray
-    world_from_standard: np.ndarray
     shadows: np.ndarray
-    shadow_size: np.ndarray
 
 
 AnyTable: TypeAlias = Table | IntegralTable | LitTable | LitIntegralTable

@@ -58,15 +58,14 @@ def shade_of(
     lighting = lighting or Lighting(diffuse=0, specular=0)
     numbers[phong.POWER] = lighting.power
     numbers[phong.TWO_SIDED], numbers[phong.BLINN] = lighting.two_sided, lighting.model == "blinn"
-    normal_from_slopes = -world_from_differences(volume)[:, axes]
+    numbers[phong.SHADOW_SIZE :][:3] = 0 if shadows is None else shadows.size(tuple(axes))
+    numbers[phong.HEADLIGHT :][:6] = _colours(lighting, lighting.headlight)
+    numbers[phong.NORMAL_FROM_SLOPES :][:9] = -world_from_differences(volume)[:, axes].ravel()
+    numbers[phong.WORLD_FROM_STANDARD :][:9] = volume.world_from_object[:3, axes].ravel()
     return Shade(
         numbers,
-        _colours(lighting, lighting.headlight),
         _lights(lighting, volume, axes, 1 if shadows is None else shadows.factor),
-        np.ascontiguousarray(normal_from_slopes, np.float32),
-        np.ascontiguousarray(volume.world_from_object[:3, axes], np.float32),
         np.zeros(1, np.uint16) if shadows is None else shadows.standard(tuple(axes)),
-        np.zeros(3, np.int64) if shadows is None else shadows.size(tuple(axes)),
     )
 
 

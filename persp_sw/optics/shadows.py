@@ -80,7 +80,6 @@ class Shadows:
             classification.origin,
             classification.scale,
             len(classification.table) - 1,
-            shade.normal_from_slopes.astype(np.float64),
             shade.numbers.astype(np.float64),
             self.factor,
             out,
