@@ -186,7 +186,7 @@ def _table(appearance: Appearance, preintegrated: bool, volume: Volume, axis: in
         return table
     shade = shade_of(look, volume, list(STANDARD_AXES[axis]), classification, shadows)
     if preintegrated:
-        return LitIntegralTable(*table, *shade)
+        return LitIntegralTable(*table, integrals.places, *shade)
     return LitTable(*table, (classification.table[:, 3] > 0).astype(np.uint8), *shade)
 
 

@@ -163,9 +163,12 @@ def composite_pixel(
     return result
 
 
-def preintegrated_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale):
+def preintegrated_pixel(rows, face, box, half_spaces, metric, per_interval, table, origin, scale, lit=None):
     """As `composite_pixel`, pre-integrated: a piece's opacity is that of the mean of the table's rows between
-    its ends', its colour the mean, weighted by extinction, over the first part of them (see `seen_colour`).
+    its ends', its colour the mean, weighted by extinction, over the first part of them (see `seen_part`).
+
+    `lit`: given the place (i, j, k) where the mean of what is seen of a piece lies, and its colour, what
+    light makes of it.
     """
     e, sign, t = np.array(face[:3]), face[3], np.array(face[4:6])
     near, far, length = ray_range(face, half_spaces, metric)
@@ -199,22 +202,36 @@ def preintegrated_pixel(rows, face, box, half_spaces, metric, per_interval, tabl
         covered = table[np.clip(np.arange(first, last + 1), 1, len(table) - 1)].astype(float)
         depth = covered[:, 3].mean() * length * (end - begin)
         if depth:
-            colour = seen_colour(covered if rising else covered[::-1], depth)
+            covered = covered if rising else covered[::-1]
+            colour = seen_part(covered, depth) @ covered[:, :3]
+            if lit:
+                hit = begin + (end - begin) * hit_place(covered[:, 3], depth)
+                colour = lit(e + np.array([*t, sign]) * hit, (i0, j0, k0), colour)
             result += (1 - result[3]) * -np.expm1(-depth) * np.array([*colour, 1])
     return result
 
 
-def seen_colour(rows, depth):
-    """The mean colour of rows (r, g, b, τ) front to back over as much extinction as has its mean place where
-    exp(−x) has it, x = 0 … depth.
+def mean_depth(depth):
+    """The optical depth, as a share of all, where exp(−x) has its mean place, x = 0 … depth."""
+    return 0.5 - depth / 12 if depth < 1e-3 else 1 / depth - 1 / np.expm1(depth)
+
+
+def seen_part(rows, depth):
+    """Shares of rows (r, g, b, τ), front to back, in a piece's colour: parts of their extinction, in all 1.
+
+    So many from the front that their mean place is where exp(−x) has it.
     """
-    mean_place = 1 - depth * np.exp(-depth) / -np.expm1(-depth)
-    if depth < 1e-4:
-        mean_place = depth / 2
     passed = np.concatenate([[0], np.cumsum(rows[:, 3])])
-    amount = passed[-1] * 2 * mean_place / depth
-    taken = np.clip(amount - passed[:-1], 0, rows[:, 3])
-    return taken @ rows[:, :3] / taken.sum()
+    taken = np.clip(passed[-1] * 2 * mean_depth(depth) - passed[:-1], 0, rows[:, 3])
+    return taken / taken.sum()
+
+
+def hit_place(extinctions, depth):
+    """Where along a piece, 0 … 1, the mean place of what is seen of it lies; rows front to back."""
+    passed = np.concatenate([[0], np.cumsum(extinctions)])
+    wanted = passed[-1] * mean_depth(depth)
+    row = np.searchsorted(passed, wanted, side="right") - 1
+    return (row + (wanted - passed[row]) / extinctions[row]) / len(extinctions)
 
 
 def warp_pixel(direction, faces, alone):

@@ -189,6 +189,16 @@ def look_up_column(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value, colum
     return result
 
 
+def look_up_float(builder: ir.IRBuilder, table: ir.Value, rows: ir.Value) -> Floats:
+    """`rows` of a table of single floats."""
+    result = ir.Constant(_FLOATS, ir.Undefined)
+    for lane in range(TILE):
+        row = builder.zext(builder.extract_element(rows, ir.Constant(_INT32, lane)), _INT64)
+        number = builder.load(builder.gep(table, [row]))
+        result = builder.insert_element(result, number, ir.Constant(_INT32, lane))
+    return Floats(builder, result)
+
+
 def any_set(builder: ir.IRBuilder, flags: ir.Value, rows: ir.Value) -> ir.Value:
     """Whether any of flags[rows], bytes, is not 0."""
     result = ir.Constant(ir.IntType(8), 0)

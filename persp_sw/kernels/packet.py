@@ -47,8 +47,8 @@ def shows(n, table, cells, lanes, at, section):
 
 
 def illuminate(
-    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
-    light, sample_at,
+    n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch, cells,
+    lanes, at, section, light, sample_at,
 ):  # fmt: skip
     """Find what gradients change of the samples in `section`, if a `table` asks for it and they show
     anything; see `packet_lit.light_up`. Compiled code only.
@@ -109,22 +109,27 @@ def _lit_reach(table):
 
 
 @inlined_kernel
+def _lit_piece_reach(table):
+    return np.uint64(np.ceil(table.numbers[REACH])) + np.uint64(1)
+
+
+@inlined_kernel
 def _no_light(
-    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
-    light, sample_at,
+    n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch, cells,
+    lanes, at, section, light, sample_at,
 ):  # fmt: skip
     return
 
 
 @inlined_kernel
 def _light(
-    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
-    light, sample_at,
+    n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch, cells,
+    lanes, at, section, light, sample_at,
 ):  # fmt: skip
     if shows(n, table, cells, lanes, np.uint64(at), section):
         light_up(
-            n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes,
-            np.uint64(at), light, sample_at,
+            n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch,
+            cells, lanes, np.uint64(at), section, light, sample_at,
         )  # fmt: skip
 
 
@@ -143,7 +148,7 @@ def _choose_sample(
 
 @kernel_by_type(reach_of)
 def _choose_reach(table):
-    return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_reach)
+    return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_piece_reach)
 
 
 @kernel_by_type(shows)
@@ -153,8 +158,8 @@ def _choose_shows(n, table, cells, lanes, at, section):
 
 @kernel_by_type(illuminate)
 def _choose_light(
-    n, start, begin, end, y, z, x, step, low, high, ray, level, table, scratch, cells, lanes, at, section,
-    light, sample_at,
+    n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch, cells,
+    lanes, at, section, light, sample_at,
 ):  # fmt: skip
     return _by_kind(table, _no_light, _no_light, _light, _light)
 

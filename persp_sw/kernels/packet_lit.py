@@ -7,17 +7,20 @@ far apart they are.
 
 import numpy as np
 
-from .._jit import VECTORS, inlined_kernel, lean_kernel
+from .._jit import VECTORS, inlined_kernel, kernel_by_type, lean_kernel
 from .encode import PADDING
 from .packet_portable import WINDOW
 from .phong import PER_SHADOW, REACH, SHADOW, SHADOW_SIZE, START
 from .scanline import ROUNDING
-from .state import LEFT, NEIGHBOURS, TILE
+from .state import COSINE, LEFT, NEIGHBOURS, TILE
+from .tables import LitIntegralTable
 
 if VECTORS:
+    from .hit_point_vector import find_hit_points, find_slopes_at
     from .packet_lit_vector import add_light, find_slopes, shade, shows_classified, shows_integrated
     from .packet_vector import sample
 else:
+    from .hit_point import find_hit_points, find_slopes_at
     from .packet_lit_portable import find_slopes, shows_classified, shows_integrated
     from .packet_portable import sample
     from .phong import add_light, shade
@@ -68,47 +71,19 @@ def _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cell
         first = last
 
 
-@lean_kernel
-def light_up(
-    n,
-    start,
-    begin,
-    end,
-    y,
-    z,
-    x,
-    step,
-    low,
-    high,
-    ray,
-    level,
-    shades,
-    scratch,
-    cells,
-    lanes,
-    at,
-    light,
-    sample_at,
-):
-    """Light's sections of a packet's samples from their gradients; see `phong.shade`.
+@inlined_kernel
+def _in_cell(place, cell):
+    """Pre-integration looks at places beyond their cell."""
+    return min(max(place, np.float64(cell)), np.float64(cell) + 1.0)
 
-    Parameters
-    ----------
-    start
-        The voxel from which places along i are counted in float32: the same for all windows of a packet.
-    begin, end
-        The cells of a row that show anything.
-    y, z, x, step, low, high
-        Where the samples are, in the level's voxels: scanline, slice, and x + l·step along i, clamped to
-        [low, high].
-    ray
-        float32 (t_i of lane 0, its growth a lane, t_j, sign), in the volume's voxels.
-    shades
-        A lit table of `tables`.
-    light, sample_at
-        Where the light's sections begin in `lanes`, and the sample's among them.
-    """
-    reach = np.float64(shades.numbers[REACH])
+
+@inlined_kernel
+def _slopes_on_plane(
+    n, start, begin, end, cell, y, z, x, step, low, high, level, table, scratch, cells, lanes, slopes
+):  # fmt: skip
+    """Slopes where the packet's plane is, see `light_up`."""
+    y, z = _in_cell(y, cell[0]), _in_cell(z, cell[1])
+    reach = np.float64(table.numbers[REACH])
     pad = np.uint64(np.ceil(reach))
     n_i, n_j, n_k = level.columns, level.needed.shape[0], level.needed.shape[1]
     first = begin - pad if begin > pad else _NONE
@@ -119,12 +94,115 @@ def light_up(
         max(z - reach, 0.0),
         min(z + reach, n_k - 1.0),
     )
-    slopes = light + NEIGHBOURS
     find_slopes(
         n, start, begin, first, last, y, z, reach, sides, x, step, low, high, level, scratch, cells, lanes,
         slopes,
     )  # fmt: skip
+
+
+def find_gradients(
+    n, start, begin, end, cell, y, z, x, step, low, high, path, share, level, table, scratch, cells, lanes,
+    at, section, slopes,
+):  # fmt: skip
+    """Slopes where a packet's samples have their normals, into three lines from `slopes`. Compiled code only.
+
+    Of samples that is where they are; of pieces where their ray sees them, between those of both ends.
+    """
+    raise NotImplementedError
+
+
+@inlined_kernel
+def _at_samples(
+    n, start, begin, end, cell, y, z, x, step, low, high, path, share, level, table, scratch, cells, lanes,
+    at, section, slopes,
+):  # fmt: skip
+    _slopes_on_plane(
+        n, start, begin, end, cell, y, z, x, step, low, high, level, table, scratch, cells, lanes, slopes
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _at_hit_points(
+    n, start, begin, end, cell, y, z, x, step, low, high, path, share, level, table, scratch, cells, lanes,
+    at, section, slopes,
+):  # fmt: skip
+    if table.numbers[REACH] == _F(1.0):
+        hits = slopes + COSINE - NEIGHBOURS
+        find_hit_points(n, path, share, table, lanes, at, section, hits)
+        find_slopes_at(
+            n, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, hits, slopes
+        )
+    else:
+        _slopes_on_plane(
+            n, start, begin, end, cell, y, z, x, step, low, high, level, table, scratch, cells, lanes, slopes
+        )
+
+
+@kernel_by_type(find_gradients)
+def _choose_gradients(
+    n, start, begin, end, cell, y, z, x, step, low, high, path, share, level, table, scratch, cells, lanes,
+    at, section, slopes,
+):  # fmt: skip
+    return _at_hit_points if table.instance_class is LitIntegralTable else _at_samples
+
+
+@lean_kernel
+def light_up(
+    n,
+    start,
+    begin,
+    end,
+    cell,
+    y,
+    z,
+    x,
+    step,
+    low,
+    high,
+    ray,
+    path,
+    share,
+    level,
+    shades,
+    scratch,
+    cells,
+    lanes,
+    at,
+    section,
+    light,
+    sample_at,
+):
+    """Light's sections of a packet's samples from their gradients; see `phong.shade`.
+
+    Parameters
+    ----------
+    start
+        The voxel from which places along i are counted in float32: the same for all windows of a packet.
+    begin, end
+        The cells of a row that rays may be in, all of one run.
+    cell
+        (j, k) of these cells.
+    y, z, x, step, low, high
+        Where the samples are, in the level's voxels: scanline and slice, clamped to the cell, and x + l·step
+        along i, clamped to [low, high].
+    ray
+        float32 (t_i of lane 0, its growth a lane, t_j, sign), in the volume's voxels.
+    path, share
+        See `hit_point.find_hit_points`; of no account to a `LitTable`.
+    shades
+        A lit table of `tables`.
+    at, section
+        The tile, and its section with the samples.
+    light, sample_at
+        Where the light's sections begin in `lanes`, and the sample's among them.
+    """
+    slopes = light + NEIGHBOURS
+    find_gradients(
+        n, start, begin, end, cell, y, z, x, step, low, high, path, share, level, shades, scratch, cells,
+        lanes, at, section, slopes,
+    )  # fmt: skip
     shade(n, ray, slopes, shades, lanes, at, light, sample_at)
+    y, z = _in_cell(y, cell[0]), _in_cell(z, cell[1])
     for number in range(shades.lights.shape[0]):
         _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cells, lanes, light)
         add_light(n, number, shades, lanes, light, sample_at)

@@ -126,7 +126,7 @@ def sample(
         )  # fmt: skip
 
 
-class _Piece:
+class Piece:
     """One pre-integrated sample of a tile, from the rows it left to its extinction."""
 
     def __init__(self, builder, tile, entries, beyond, end, sections):
@@ -183,6 +183,15 @@ def _seen_part(depth, alpha):
     return simd.where(depth < float(THIN), 1.0 - depth * (1.0 / 6.0), thick)
 
 
+def edges(context, builder, beyond_type, beyond):
+    """The first and the last row of a table, for what lies beyond: [side][column], in all lanes."""
+    data = pointer(context, builder, beyond_type, beyond)
+    columns = [
+        simd.everywhere(builder, builder.load(builder.gep(data, [word(column)]))) for column in range(8)
+    ]
+    return columns[:4], columns[4:]
+
+
 def _blender(lit):
     """The blending of two samples, plain or lit."""
 
@@ -193,17 +202,10 @@ def _blender(lit):
             state = pointer(context, builder, signature.args[7], arguments[7])
             tile = Tile(builder, state, arguments[8])
             lights = [Light(builder, state, arguments[9], n) if lit else None for n in range(2)]
-            outside = pointer(context, builder, signature.args[1], arguments[1])
-            beyond = [
-                [
-                    simd.everywhere(builder, builder.load(builder.gep(outside, [word(4 * side + n)])))
-                    for n in range(4)
-                ]
-                for side in range(2)
-            ]
+            beyond = edges(context, builder, signature.args[1], arguments[1])
             end, unit, steps = (simd.everywhere(builder, scalar) for scalar in arguments[2:5])
             pieces = [
-                _Piece(builder, tile, entries, beyond, end, sections)
+                Piece(builder, tile, entries, beyond, end, sections)
                 for sections in ((VALUE, VALUE_END), (SECOND, SECOND_END))
             ]
 

@@ -54,6 +54,7 @@ class LitIntegralTable(NamedTuple):
     end: np.float32
     unit: np.float32
     steps: np.float32
+    places: np.ndarray
     numbers: np.ndarray
     lights: np.ndarray
     shadows: np.ndarray

@@ -30,6 +30,9 @@ class Preintegration:
         table.
     unit
         Extinction of one in `sums`.
+    places
+        (STEPS + 2,) float32: the row, and the part of it, before which the sum of τ has grown to n / STEPS
+        of its last; the last place twice.
     steps
         Steps in one of `sums`' extinction: STEPS / sums[end, 3]; 0 where there is none.
 
@@ -46,6 +49,7 @@ class Preintegration:
     beyond: NDArray[np.float32]
     unit: float
     steps: float
+    places: NDArray[np.float32]
 
     @classmethod
     def of(cls, table: NDArray[np.float32]) -> Preintegration:
@@ -63,4 +67,9 @@ class Preintegration:
         even = np.stack([np.interp(at, sums[rising, 3], column[rising]) for column in sums.T], -1)
         whole = np.rint(np.concatenate([sums, even]) / unit).astype(np.int32)
         steps = STEPS * unit / total if total > 0 else 0.0
-        return cls(whole, len(sums) - 1, beyond.astype(np.float32), unit, steps)
+        # Where a stretch of rows shows nothing, the place is its end.
+        after = np.clip(np.searchsorted(sums[:, 3], at, side="right"), 1, len(sums) - 1)
+        low, high = sums[after - 1, 3], sums[after, 3]
+        places = after - 1 + np.clip((at - low) / np.where(high > low, high - low, 1), 0, 1)
+        places = np.append(places, places[-1]).astype(np.float32)
+        return cls(whole, len(sums) - 1, beyond.astype(np.float32), unit, steps, places)
