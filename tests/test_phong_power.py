@@ -13,7 +13,7 @@ from persp_sw.kernels import packet_lit_vector, phong
 from persp_sw.kernels.packet_vector import Tile, pointer
 from persp_sw.kernels.state import TILE
 
-_portable_power = phong._power
+_portable_power = phong.power_of
 SMALLEST = float(np.finfo(np.float32).tiny)
 
 
@@ -35,7 +35,7 @@ def _sixteen(_context, x, power, out, at):
         data = Tile(builder, pointer(context, builder, signature.args[0], arguments[0]), arguments[3])
         result = Tile(builder, pointer(context, builder, signature.args[2], arguments[2]), arguments[3])
         power = simd.everywhere(builder, arguments[1])
-        result.write(packet_lit_vector._power(builder, data.read(0), power), 0)
+        result.write(packet_lit_vector.power_of(builder, data.read(0), power), 0)
         return context.get_dummy_value()
 
     return types.void(x, types.float32, out, types.int64), build

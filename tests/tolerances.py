@@ -210,6 +210,13 @@ LIT_PIECE_TWIN = 1.5e-3
 PACKET_SLOPES = (2 * 1.1e-6 + 2 * 2 * 4e-6) / 0.5
 # Cosines of float32 normals, some ten roundings of 6e-8, to the power of 50; of lights of up to 0.3.
 PACKET_LIGHT = 3e-5
+# Reflectance maps. A place on the octahedron has some five roundings of 6e-8; across it diffuse light changes
+# by up to √3 times the lights' colours (2 in sum), and is multiplied by up to √3 again; and as many roundings
+# of the sum. Mirrored light of power p changes by √3·0.61·√p of a highlight: of power 100 by ten of 0.6.
+MAP_LOOK_UP = 2 * 3 * 10 * 6e-8
+# Diffuse maps err most where a light sets, in proportion to a triangle's edge; how they lie there differs.
+# Maps of mirrored light: the next term of the error is power / half² of the first, 0.1 at the coarsest.
+MAP_ORDER = 0.15
 
 # --- Powers of cosines ------------------------------------------------------------------------------------
 

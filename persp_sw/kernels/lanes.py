@@ -78,6 +78,10 @@ class Floats:
         bound = self._new(self._other(bound))
         return where(self.builder.fcmp_ordered("<", self.value, bound.value), self, bound)
 
+    def absolute(self) -> Floats:
+        """Without their signs."""
+        return self._of_each("fabs")
+
     def floor(self) -> Floats:
         """Largest whole number not above."""
         return self._of_each("floor")

@@ -10,7 +10,7 @@ import numpy as np
 from .._jit import VECTORS, inlined_kernel, kernel_by_type, lean_kernel
 from .encode import PADDING
 from .packet_portable import WINDOW
-from .phong import PER_SHADOW, REACH, SHADOW, SHADOW_SIZE, START
+from .phong import HALF_DIFFUSE, PER_SHADOW, REACH, SHADOW, SHADOW_SIZE, START
 from .scanline import ROUNDING
 from .state import COSINE, LEFT, NEIGHBOURS, TILE
 from .tables import LitIntegralTable
@@ -19,11 +19,13 @@ if VECTORS:
     from .hit_point_vector import find_hit_points, find_slopes_at
     from .packet_lit_vector import add_light, find_slopes, shade, shows_classified, shows_integrated
     from .packet_vector import sample
+    from .reflect_vector import reflect
 else:
     from .hit_point import find_hit_points, find_slopes_at
     from .packet_lit_portable import find_slopes, shows_classified, shows_integrated
     from .packet_portable import sample
     from .phong import add_light, shade
+    from .reflect import reflect
 
 __all__ = ["light_up", "shows_classified", "shows_integrated"]
 
@@ -206,3 +208,5 @@ def light_up(
     for number in range(shades.lights.shape[0]):
         _find_left(n, number, y, z, x, step, low, high, level, shades, scratch, cells, lanes, light)
         add_light(n, number, shades, lanes, light, sample_at)
+    if shades.numbers[HALF_DIFFUSE] > _F(0.0):
+        reflect(n, shades.numbers, lanes, light, sample_at)

@@ -166,8 +166,8 @@ def find_slopes(
         _between_wide(level.voxels, rows, numbers, lanes, at)
 
 
-def _power(builder, x, power):
-    """See `phong._power`."""
+def power_of(builder, x, power):
+    """See `phong.power_of`."""
     exponent, mantissa = x.exponent_and_mantissa()
     large = mantissa > float(phong.ROOT2)
     mantissa = simd.where(large, mantissa * 0.5, mantissa)
@@ -238,7 +238,7 @@ def _shade_rays(_context, numbers, ray, slopes, lanes, at, light, sample):
         facing = cosine.at_least(0.0)
         blinn = n[phong.BLINN] > 0.0
         mirrored = simd.where(blinn, facing, 2.0 * facing * facing - fading)
-        highlight = _power(builder, mirrored, n[phong.POWER])
+        highlight = power_of(builder, mirrored, n[phong.POWER])
         for channel in range(3):
             mine.write((n[phong.OWN] + facing * colours[channel]) * tint, _LIT[channel])
             mine.write(highlight * colours[3 + channel], _SHINE[channel])
@@ -275,7 +275,7 @@ def _add_one(_context, numbers, lights, number, lanes, light, sample):
         )
         mirrored = simd.where(cosine > 0.0, mirrored, 0.0)
         left = room.read(LEFT)
-        highlight = left * _power(builder, mirrored, n[phong.POWER])
+        highlight = left * power_of(builder, mirrored, n[phong.POWER])
         facing = left * facing.at_least(0.0) * room.read(TINT)
         mine = Tile(builder, state, builder.add(arguments[4], arguments[5]))
         for channel in range(3):

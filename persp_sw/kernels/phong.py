@@ -43,9 +43,9 @@ _L1, _L3, _L5, _L7 = LOG2_COEFFICIENTS
 # `Shade.numbers`.
 (
     REACH, OWN, POWER, TWO_SIDED, BLINN, FAINT, LOW, PER_WEIGHT, THICKENED, COLOURED, PER_MAGNITUDE, ROWS,
-    MAGNITUDES, PER_SHADOW,
-) = range(14)  # fmt: skip
-SHADOW_SIZE, HEADLIGHT, NORMAL_FROM_SLOPES, WORLD_FROM_STANDARD, NUMBERS = 14, 17, 23, 32, 41
+    MAGNITUDES, PER_SHADOW, HALF_DIFFUSE, HALF_MIRRORED,
+) = range(16)  # fmt: skip
+SHADOW_SIZE, HEADLIGHT, NORMAL_FROM_SLOPES, WORLD_FROM_STANDARD, NUMBERS = 16, 19, 25, 34, 43
 # Columns of `Shade.lights`.
 DIFFUSE, SPECULAR, SHADOW, START, LIGHT_COLUMNS = 3, 6, 9, 10, 13
 
@@ -54,16 +54,19 @@ class Shade(NamedTuple):
     """What gradients do to a transfer function's colours and extinction.
 
     numbers
-        float32 (NUMBERS,): voxels to the neighbours; what colours shine with by themselves; the highlights'
+        float32 (NUMBERS …,): voxels to the neighbours; what colours shine with by themselves; the highlights'
         power; whether normals turn towards the eye, whether highlights are Blinn's; ε²; a modulation's lowest
         magnitude, weight a magnitude, and its shares of extinction and colour; a magnitude of the table a
-        magnitude, the table's rows for each of them, and how many there are; places of shadows a voxel.
-        From SHADOW_SIZE: shadows' places along i, j and k. From HEADLIGHT: diffuse and specular colour of
-        the light at the eye. From NORMAL_FROM_SLOPES and WORLD_FROM_STANDARD, row by row: −A⁻ᵀ, and A. All
-        in one array, for each that is passed costs every packet some nanoseconds.
+        magnitude, the table's rows for each of them, and how many there are; places of shadows a voxel; half
+        the cells along an edge of the maps of diffuse and of mirrored light, 0 where there is none. From
+        SHADOW_SIZE: shadows' places along i, j and k. From HEADLIGHT: diffuse and specular colour of the
+        light at the eye. From NORMAL_FROM_SLOPES and WORLD_FROM_STANDARD, row by row: −A⁻ᵀ, and A. From
+        NUMBERS: the maps' texels, see `reflect`. All in one array, for each that is passed costs every packet
+        some nanoseconds.
     lights
-        float32 (n, LIGHT_COLUMNS): direction towards a light, world, its diffuse and specular colour, the
-        number of its shadows or −1, and from where they count, voxels along i, j and k.
+        float32 (n, LIGHT_COLUMNS), of the lights that are in no map: direction towards a light, world, its
+        diffuse and specular colour, the number of its shadows or −1, and from where they count, voxels along
+        i, j and k.
     shadows
         How much is left of lights that cast shadows, 65535 for all: uint16, [light, j, k, i] in one line,
         `encode.PADDING` before and after it.
@@ -75,7 +78,7 @@ class Shade(NamedTuple):
 
 
 @inlined_kernel
-def _power(x, power):
+def power_of(x, power):
     """x^power for x ≤ 1, as float32 can; 0 for x ≤ 0."""
     exponent, mantissa = exponent_and_mantissa(x)
     large = mantissa > ROOT2
@@ -173,7 +176,7 @@ def shade(n, ray, slopes, shades, lanes, at, light, sample):
         cosine = lanes[cosines + l]
         cosine = cosine if cosine > _F(0.0) else _F(0.0)
         mirrored = cosine if blinn else _F(2.0) * cosine * cosine - lanes[squares + l]
-        _add_light(lanes, mine, l, cosine * lanes[tints + l], _power(mirrored, power), bright, shine)
+        _add_light(lanes, mine, l, cosine * lanes[tints + l], power_of(mirrored, power), bright, shine)
 
 
 @inlined_kernel
@@ -202,7 +205,7 @@ def add_light(n, number, shades, lanes, light, sample):
         mirrored = mirrored if cosine > _F(0.0) else _F(0.0)
         facing = facing if facing > _F(0.0) else _F(0.0)
         left = lanes[lefts + l]
-        highlight = left * _power(mirrored, power)
+        highlight = left * power_of(mirrored, power)
         _add_light(lanes, mine, l, left * facing * lanes[tints + l], highlight, bright, shine)
 
 

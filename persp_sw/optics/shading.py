@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,9 @@ from ..volume.gradient import FAINTEST, largest_magnitude, world_from_difference
 from ..volume.grid import Volume
 from ..volume.lift import lift_exponent
 from .classification import Classification
-from .lighting import Lighting
+from .lighting import Light, Lighting
 from .look import Look, Modulation
+from .reflectance import Reflectance, reflectance_of
 
 if TYPE_CHECKING:
     from .shadows import Shadows
@@ -62,11 +64,21 @@ def shade_of(
     numbers[phong.HEADLIGHT :][:6] = _colours(lighting, lighting.headlight)
     numbers[phong.NORMAL_FROM_SLOPES :][:9] = -world_from_differences(volume)[:, axes].ravel()
     numbers[phong.WORLD_FROM_STANDARD :][:9] = volume.world_from_object[:3, axes].ravel()
+    maps, lights = reflectance_of(lighting), lighting.lights
+    if maps is not None:
+        numbers[[phong.HALF_DIFFUSE, phong.HALF_MIRRORED]] = maps.halves
+        numbers = _joined(numbers.tobytes(), maps)
+        lights = tuple(light for light in lights if light.shadows)
     return Shade(
         numbers,
-        _lights(lighting, volume, axes, 1 if shadows is None else shadows.factor),
+        _lights(lights, lighting, volume, axes, 1 if shadows is None else shadows.factor),
         np.zeros(1, np.uint16) if shadows is None else shadows.standard(tuple(axes)),
     )
+
+
+@lru_cache(maxsize=3)  # for a volume's three axes: megabytes, which each picture would copy anew
+def _joined(numbers: bytes, maps: Reflectance) -> NDArray[np.float32]:
+    return np.concatenate([np.frombuffer(numbers, np.float32), maps.texels.ravel()])
 
 
 def _colours(lighting: Lighting, colour: tuple[float, float, float]) -> NDArray[np.float32]:
@@ -74,12 +86,14 @@ def _colours(lighting: Lighting, colour: tuple[float, float, float]) -> NDArray[
     return np.outer([lighting.diffuse, lighting.specular], colour).astype(np.float32).ravel()
 
 
-def _lights(lighting: Lighting, volume: Volume, axes: list[int], coarser: int) -> NDArray[np.float32]:
+def _lights(
+    lights: tuple[Light, ...], lighting: Lighting, volume: Volume, axes: list[int], coarser: int
+) -> NDArray[np.float32]:
     object_from_world = np.linalg.inv(volume.world_from_object[:3, :3])
     # Shadows that are coarser than the data blur a surface's outermost layer as much more.
     offset = lighting.shadow_offset * min(volume.spacing) * coarser
     rows, shadows = [], 0
-    for light in lighting.lights:
+    for light in lights:
         number, shadows = (shadows, shadows + 1) if light.shadows else (-1, shadows)
         start = (object_from_world @ light.direction * offset)[axes]
         rows.append([*light.direction, *_colours(lighting, light.colour), number, *start])

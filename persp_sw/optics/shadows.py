@@ -11,6 +11,7 @@ from ..geometry.parts import shown_parts
 from ..geometry.regions import Regions, box_rows
 from ..kernels import attenuate
 from ..kernels.encode import PADDING
+from ..kernels.phong import NUMBERS
 from ..volume.grid import Volume
 from ..volume.lift import lifted
 from .classification import Classification
@@ -80,7 +81,7 @@ class Shadows:
             classification.origin,
             classification.scale,
             len(classification.table) - 1,
-            shade.numbers.astype(np.float64),
+            shade.numbers[:NUMBERS].astype(np.float64),
             self.factor,
             out,
         )
