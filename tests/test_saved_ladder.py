@@ -62,7 +62,10 @@ def test_another_volume_function_or_number_of_threads_has_no_ladder(renderer, la
         psw.Renderer(renderer.volume, FUNCTION, psw.Settings(threads=None)),
     ]
     assert machine_key(None) == machine_key(max_threads()) != machine_key(max_threads() + 1)
-    for other in others if max_threads() > 1 else others[:2]:
+    lit = psw.Renderer(renderer.volume, FUNCTION, renderer.settings, look=psw.Look(psw.Lighting()))
+    shapes = psw.TransferFunction2D([psw.Box((40, 200), (0, 90), (1, 0.5, 0.2), 0.3)])
+    others = [lit, psw.Renderer(renderer.volume, shapes, renderer.settings), *others]
+    for other in others if max_threads() > 1 else others[:-1]:
         assert ladder_for(other, tmp_path) == Ladder.default()
     assert lines(caplog) == []
     renderer.regions = psw.Regions(crop=(0, 9, 0, 9, 0, 9))  # moves from frame to frame
@@ -86,12 +89,28 @@ def test_what_a_volume_is_known_by():
         (psw.Volume(data), psw.TransferFunction(FUNCTION.points, 2.0)),
         (psw.Volume(data), psw.TransferFunction([(0, (0, 0, 0), 0), (255, (1, 0, 1), 0.5)], 1.0)),
     ]
+    box = psw.Box((40, 200), (0, 90), (1, 0.5, 0.2), 0.3)
+    different += [(psw.Volume(data), psw.TransferFunction2D([box], unit)) for unit in (1.0, 2.0)]
+    light, shadow = psw.Light((1, 2, 3)), psw.Light((1, 2, 3), shadows=True)
+    looks = [psw.Lighting(), psw.Lighting(lights=(light,)), psw.Lighting(lights=(shadow,))]
+    different += [(psw.Volume(data), function, psw.Look(lighting)) for lighting in looks]
+    different += [(psw.Volume(data), function, psw.Look(None, psw.Modulation()))]
+    different += [(psw.Volume(data), function, psw.Look(looks[0], None, 2.0))]
     assert len({volume_key(*pair) for pair in different}) == len(different)
     same = [
         (psw.Volume(data, name="again"), FUNCTION),
         (psw.Volume(data, world_from_object=turned), function),
+        (psw.Volume(data), function, psw.Look()),
     ]
     assert {volume_key(*pair) for pair in same} == {volume_key(*different[0])}
+
+
+def test_a_light_may_move_and_shine_otherwise():
+    """The hand on the light is not to change the ladder under the controller."""
+    one = psw.Look(psw.Lighting(lights=(psw.Light((1, 2, 3)),)))
+    other = psw.Look(psw.Lighting(0.4, 0.5, 0.1, lights=(psw.Light((3, 2, -1), (1, 0, 0)),)))
+    volume = phantoms.synthetic_ct(16)
+    assert volume_key(volume, FUNCTION, one) == volume_key(volume, FUNCTION, other)
 
 
 def test_of_a_large_volume_a_part_is_hashed(monkeypatch):

@@ -42,8 +42,8 @@ accurate. From each peer an arrow leads to our time at its accuracy.
 \b
 The ladder that a frame-time controller walks is made of the compositing times
 and kept in $XDG_DATA_HOME/persp_sw/ladders, for this processor, these threads,
-this volume and transfer function. Several views of one volume and function make
-one ladder. None is kept where --quality does not reach from 0.5 to 2.
+this volume, transfer function and look (lit or not, how many lights). Several
+views of them make one ladder. None is kept where --quality does not reach from 0.5 to 2.
 """
 
 

@@ -41,7 +41,7 @@ class Chart:
     textures
         Of `textures.texture_rows`; empty where there is no OpenGL.
     volume
-        `volume_key` of the case's volume and transfer function.
+        `volume_key` of the case's volume, transfer function and look.
     """
 
     rows: list[Row]
@@ -82,7 +82,7 @@ def chart_of(case: Case, plan: Plan, qualities: Sequence[float] = QUALITIES) -> 
         row["on_front"] = index in kept
     renderer.settings = base
     textures = texture_rows(renderer, view)
-    return Chart(rows, textures, volume_key(stage.volume, stage.transfer))
+    return Chart(rows, textures, volume_key(stage.volume, stage.transfer, stage.look))
 
 
 def ladder_of(charts: Sequence[Chart], settings: Settings) -> Ladder:
