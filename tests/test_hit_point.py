@@ -211,12 +211,12 @@ def test_slopes_at_hit_points_equal_the_twin(kind, dtype, wide, rng):
         found = lines(lanes, SLOPES, 3).copy()
         lane = np.arange(TILE)
         places = np.column_stack([
-            np.clip(x + step * lane + (path[0] + path[1] * lane) * ahead, begin, begin + width),
-            np.clip(y + path[2] * ahead, j, j + 1),
-            np.clip(z + path[3] * ahead, k, k + 1),
+            x + step * lane + (path[0] + path[1] * lane) * ahead, y + path[2] * ahead, z + path[3] * ahead
         ])  # fmt: skip
-        cells = np.floor(places)
-        beyond += (cells != places).any()
+        column = np.floor(np.clip(x + step * lane, begin, begin + width - 0.001))
+        cells = np.column_stack([column, np.full(TILE, j), np.full(TILE, k)])
+        beyond += (places != np.clip(places, cells, cells + 1)).any(0)
+        places = np.clip(places, cells, cells + 1)
         for l in range(TILE):  # noqa: E741
             around = data[tuple(slice(max(int(c) - 1, 0), int(c) + 3) for c in cells[l, ::-1])].astype(float)
             expected = lit_twins.slopes(data, places[l], 1.0) / factor
@@ -226,7 +226,7 @@ def test_slopes_at_hit_points_equal_the_twin(kind, dtype, wide, rng):
                 assert np.isnan(found[:, l]).any()
         lines(lanes, SLOPES, 3)[:], lines(lanes, HITS, 1)[:] = -7.5, -7.5
         assert (lanes == -7.5).all()
-    assert beyond > 10
+    assert (beyond > 10).all()
 
 
 # --- Pictures ---------------------------------------------------------------------------------------------
@@ -235,7 +235,7 @@ def test_slopes_at_hit_points_equal_the_twin(kind, dtype, wide, rng):
 @pytest.mark.parametrize("samples", [1, 2])
 @pytest.mark.parametrize("look", ["headlight", "lights"])
 def test_lit_pieces_equal_their_twin(look, samples, rng):
-    """Where all cells show something (elsewhere hits are clamped to runs) and no gradient is faint."""
+    """Where no gradient is faint: there, a little further on, a normal may be another."""
     z, y, x = np.indices((9, 10, 11))
     volume = Volume((14 * np.sqrt((x + 3) ** 2 + (y + 4) ** 2 + (z + 2.0) ** 2)).astype(np.float32))
     look, transfer = LOOKS[look], TransferFunction([(0, (1, 0.7, 0.4), 0.1), (255, (1, 0.7, 0.4), 0.9)], 1.0)
@@ -258,7 +258,7 @@ def test_lit_pieces_equal_their_twin(look, samples, rng):
                 sight /= np.linalg.norm(sight)
 
                 def lit(place, cell, colour, rows=rows, axes=axes, sight=sight):
-                    place = np.clip(place, [0, *cell[1:]], [9e9, *np.array(cell[1:]) + 1.0])
+                    place = np.clip(place, cell, np.array(cell) + 1.0)
                     slopes = lit_twins.slopes(rows.transpose(1, 0, 2), place, 1.0)
                     gradient = world_from_differences(volume)[:, axes] @ slopes
                     factor, shine = lit_twins.phong(look.lighting, gradient, sight, FAINTEST * largest)
@@ -274,7 +274,7 @@ def test_lit_pieces_equal_their_twin(look, samples, rng):
 
 
 def test_surfaces_are_lit_where_they_are_hit():
-    """A hard surface, magnified: 36.4 dB lit in the middle of pieces, 38.7 dB where they are hit."""
+    """A hard surface, magnified: 36.4 dB lit in the middle of pieces, 38.6 dB where they are hit."""
     volume = synthetic_ct(128)
     view = eye_path(volume, "corner", (96, 96), frames=0)[0]
     transfer, look = transfer_for("ct", "surface", volume), Look(Lighting())

@@ -101,13 +101,24 @@ def test_all_ambient_light_is_none(preintegrated):
         np.testing.assert_array_equal(lit[..., 3], plain[..., 3])
 
 
-@pytest.mark.parametrize("reach", [1.0, 1.3, 4.0])
-@pytest.mark.parametrize("preintegrated", [False, True])
-def test_skipping_and_packing_change_no_lit_pixel(preintegrated, reach, rng):
-    """Of sparse voxels, so that nearly all neighbours of what is seen are not seen themselves."""
+def sparse(rng):
+    """Nearly all neighbours of what is seen are not seen themselves."""
     data = np.zeros((14, 15, 150), np.uint8)
     data[rng.random(data.shape) < 0.02] = 200
-    volume = Volume(data)
+    return Volume(data)
+
+
+def wavy(_rng):
+    """Rays see things a little beyond the cells they are sampled in."""
+    z, y, x = np.indices((20, 22, 40))
+    return Volume((120 + 100 * np.sin(0.5 * x + 6) * np.cos(0.4 * y) * np.sin(0.3 * z)).astype(np.uint8))
+
+
+@pytest.mark.parametrize("reach", [1.0, 1.3, 4.0])
+@pytest.mark.parametrize("preintegrated", [False, True])
+@pytest.mark.parametrize("made", [sparse, wavy])
+def test_skipping_and_packing_change_no_lit_pixel(made, preintegrated, reach, rng):
+    volume = made(rng)
     transfer = TransferFunction([(90, (1, 0.5, 0.2), 0), (255, (1, 1, 1), 0.9)], 1.0)
     for towards in (DIRECTIONS[0], DIRECTIONS[2], DIRECTIONS[3]):
         view = view_of(volume, towards, distance=0.8)

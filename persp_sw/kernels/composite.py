@@ -236,10 +236,9 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
     share = _F(planes[SHARE, p]), _F(planes[SLOPE, p])
     light = np.uint64(TILE * SECTIONS * tiles.states.shape[0])
     y, z = planes[ROW, p] + planes[ROW_WEIGHT, p], planes[SLICE, p] + planes[SLICE_WEIGHT, p]
-    reach, cells_of_row = reach_of(table), np.uint64(level.columns - 1)
-    span = np.uint64(WINDOW - 1) - np.uint64(2) * reach
+    span = np.uint64(WINDOW - 1) - np.uint64(2) * reach_of(table)
     samples = 0
-    block = (first - min(first, reach)) // _BLOCK
+    block = first // _BLOCK
     while block * _BLOCK < end:
         bits = window(chunk.masks, p, block)
         if bits == _NONE:
@@ -263,12 +262,10 @@ def _composite_packet(n, p, pixel, near, far, waiting, t_j, face, chunk, level, 
                 _F(last_cell - start), _F(begin - first), _F(window_end - first), path, table, scratch, cells,
                 lanes, at, SECOND if waiting else VALUE,
             )  # fmt: skip
-            # Before rays see anything they may leave the packet's cells for others of the run.
-            around = max(begin, block * _BLOCK + _ONE) - _ONE, min(window_end + _ONE, until * _BLOCK)
             illuminate(
-                n, start, around[0], min(around[1], cells_of_row), (j, k), y, z, x_first, step, low, high,
-                ray, path, share, level, table, scratch, cells, lanes, at, SECOND if waiting else VALUE,
-                light, LIGHT_OF_SECOND if waiting else _NONE,
+                n, start, begin, window_end, (j, k), y, z, x_first, step, low, high, ray, path, share, level,
+                table, scratch, cells, lanes, at, SECOND if waiting else VALUE, light,
+                LIGHT_OF_SECOND if waiting else _NONE,
             )  # fmt: skip
             number = _ONE if waiting else _NONE
             tiles.slots[number, 0], tiles.slots[number, 1] = near, far

@@ -81,9 +81,9 @@ def _finder(registers):
             state = pointer(context, builder, signature.args[4], arguments[4])
             ahead = Tile(builder, state, arguments[5]).read(0)
             lane = simd.constant(builder, list(range(TILE)))
-            place = (x + lane * step + (t_i + lane * t_step) * ahead).at_least(low).at_most(high)
-            cell = place.floor().at_most(last_cell)
-            x = place - cell
+            place = x + lane * step
+            cell = place.at_least(low).at_most(high).floor().at_most(last_cell)
+            x = (place + (t_i + lane * t_step) * ahead - cell).at_least(0.0).at_most(1.0)
             y = (w_j + t_j * ahead).at_least(0.0).at_most(1.0)
             z = (w_k + towards * ahead).at_least(0.0).at_most(1.0)
 
@@ -112,7 +112,7 @@ def _finder(registers):
             others = [between(*voxels_of(number, cell_ends), x) for number in range(4, 12)]
             found = Tile(builder, state, arguments[6])
             near, far = between(*along_i[:2], y), between(*along_i[2:], y)
-            found.write(between(near, far, z) * per_i / apart(place, least, most), 0)
+            found.write(between(near, far, z) * per_i / apart(cell + x, least, most), 0)
             near = between(own[1] - others[0], others[1] - own[0], y)
             far = between(own[3] - others[2], others[3] - own[2], y)
             found.write(between(near, far, z) * per_j / apart(y, *borders[2:4]), TILE)

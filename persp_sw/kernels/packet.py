@@ -109,11 +109,6 @@ def _lit_reach(table):
 
 
 @inlined_kernel
-def _lit_piece_reach(table):
-    return np.uint64(np.ceil(table.numbers[REACH])) + np.uint64(1)
-
-
-@inlined_kernel
 def _no_light(
     n, start, begin, end, cell, y, z, x, step, low, high, ray, path, share, level, table, scratch, cells,
     lanes, at, section, light, sample_at,
@@ -148,7 +143,7 @@ def _choose_sample(
 
 @kernel_by_type(reach_of)
 def _choose_reach(table):
-    return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_piece_reach)
+    return _by_kind(table, _no_reach, _no_reach, _lit_reach, _lit_reach)
 
 
 @kernel_by_type(shows)

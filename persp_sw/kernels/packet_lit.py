@@ -181,7 +181,7 @@ def light_up(
     start
         The voxel from which places along i are counted in float32: the same for all windows of a packet.
     begin, end
-        The cells of a row that rays may be in, all of one run.
+        The cells of a row that show anything.
     cell
         (j, k) of these cells.
     y, z, x, step, low, high
