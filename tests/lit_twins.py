@@ -91,13 +91,34 @@ def swept(extinction, from_end, shift, length):
     return left
 
 
-def coarse(extinction, factor):
-    """Means [z, y, x] around every `factor`-th voxel, weighed by a tent that reaches to the next."""
+def coarse(extinction, factor, length):
+    """Extinctions [z, y, x] around every `factor`-th voxel, whose part of light that passes `length` is the
+    mean of the voxels' parts, weighed by a tent that reaches to the next."""
+    passing = np.exp(-length * extinction)
     for axis in range(3):
-        n = extinction.shape[axis]
+        n = passing.shape[axis]
         count = -(-(n - 1) // factor) + 1
         distance = np.abs(np.arange(count)[:, None] * factor - np.arange(n))
         weights = np.maximum(factor - distance, 0).astype(float)
-        weights /= weights.sum(1, keepdims=True).clip(1e-300)
-        extinction = np.moveaxis(np.tensordot(weights, extinction, (1, axis)), 0, axis)
-    return extinction
+        weights /= weights.sum(1, keepdims=True)
+        passing = np.moveaxis(np.tensordot(weights, passing, (1, axis)), 0, axis)
+    return -np.log(passing) / length
+
+
+def beside(left, passing):
+    """Each voxel's light, replaced in part by that of neighbours that more light passes."""
+    result = left.copy()
+    for place in np.ndindex(left.shape):
+        weights, gained = 0.0, 0.0
+        for step in np.ndindex(3, 3, 3):
+            other = tuple(np.array(place) + step - 1)
+            if min(other) < 0 or any(np.array(other) >= left.shape):
+                continue
+            more = max(passing[other] - passing[place], 0)
+            weight = 0.5 ** np.abs(np.array(step) - 1).sum() * more**4
+            weights += weight
+            gained += weight * left[other]
+        if weights > 0:
+            share = min(weights, 1)
+            result[place] += share * (gained / weights - left[place])
+    return result

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from test_composite import smooth_volume
 from tolerances import (
+    SHADOW_BESIDE,
     SHADOW_BYTES,
     SHADOW_COARSE,
     SHADOW_FACTOR,
@@ -101,13 +102,16 @@ def extinction_of(volume, transfer, look):
     return result
 
 
+LENGTH = 1.3
+
+
 def coarse_extinction(volume, transfer, look, factor):
     classification = classify(transfer, volume)
     shade = shade_of(look, volume, [0, 1, 2], classification)
     out = np.full([-(-(n - 1) // factor) + 1 for n in volume.data.shape], np.nan, np.float32)
     attenuate.coarse_extinction(
         volume.data, classification.rows, classification.origin, classification.scale,
-        len(classification.table) - 1, shade.numbers.astype(float), factor, out,
+        len(classification.table) - 1, shade.numbers.astype(float), factor, LENGTH, out,
     )  # fmt: skip
     return out
 
@@ -121,7 +125,7 @@ def test_extinction_is_the_mean_around_every_coarse_voxel(dtype, shape, factor):
         data[1, 2, 3] = data[-1, -1, -1] = np.nan
     volume = Volume(data, (1, 0.7, 1.6))
     found = coarse_extinction(volume, HAZE, Look(), factor)
-    expected = lit_twins.coarse(extinction_of(volume, HAZE, Look()), factor)
+    expected = lit_twins.coarse(extinction_of(volume, HAZE, Look()), factor, LENGTH)
     assert expected.max() > 0.1
     np.testing.assert_allclose(found, expected, rtol=SHADOW_COARSE, atol=0)
 
@@ -144,7 +148,9 @@ def test_magnitudes_change_the_extinction(factor, transfer, look, rng):
     assert np.abs(
         expected - extinction_of(volume, transfer, replace(look, modulation=None))
     ).max() > 0.02 or (transfer is SHAPES and look.modulation is None)
-    np.testing.assert_allclose(found, lit_twins.coarse(expected, factor), rtol=SHADOW_COARSE, atol=1e-7)
+    np.testing.assert_allclose(
+        found, lit_twins.coarse(expected, factor, LENGTH), rtol=SHADOW_COARSE, atol=1e-7
+    )
 
 
 # --- Sweeping ---------------------------------------------------------------------------------------------
@@ -329,11 +335,14 @@ ALONG_X = {
 @pytest.mark.parametrize("sign", [-1, 1])
 @pytest.mark.parametrize("name", ALONG_X)
 def test_what_is_cut_away_casts_no_shadow(name, sign):
-    """Borders across the light, at any place in a cell: all voxels half a one from them are exact."""
+    """Borders across the light, at any place in a cell: all voxels half a one from them are right.
+
+    Those with no clear neighbour are exact.
+    """
     regions, shown = ALONG_X[name]
     left = parts(shadows_of(fog(), EVEN, lit_from((sign, 0, 0)), regions))[0]
     x = np.arange(LONG[0])
-    far = np.full(LONG[0], True)
+    off = np.full(LONG[0], np.inf)
     depth = np.zeros(LONG[0])
     for low, high in shown:
         on_the_way = (max(low, 0), high) if sign > 0 else (low, high)
@@ -341,10 +350,13 @@ def test_what_is_cut_away_casts_no_shadow(name, sign):
         end = np.full(LONG[0], high) if sign > 0 else np.minimum(x, on_the_way[1])
         depth += np.maximum(end - begin, 0)
         for border in (low, high):
-            far &= (np.abs(x - border) >= 0.5) | (border in (0, 11))
-    assert far.sum() >= 6
+            if border not in (0, 11):
+                off = np.minimum(off, np.abs(x - border))
+    far, near = off >= 1.5, (off >= 0.5) & (off < 1.5)
+    assert far.sum() >= 2 and near.sum() + far.sum() >= 6
     truth = np.broadcast_to(np.exp(-TAU * depth), left.shape)  # the volume's sides along the light as well
     assert np.abs(left - truth)[..., far].max() < SHADOW_BYTES
+    assert np.abs(left - truth)[..., near].max(initial=0) < SHADOW_BESIDE
     assert (np.diff(left, axis=2) * sign > -SHADOW_BYTES).all()
 
 

@@ -54,6 +54,9 @@ SHADOW_COARSE = 2e-7
 SHADOW_SWEEP = 2e-6
 # Half of 1/65535, and as above.
 SHADOW_BYTES = 0.5 / 65535 + 2e-6
+# A voxel in fog that lets e^(−0.2) pass, beside a clear side, whose weights sum up to 2: of the difference to
+# it, 0.18, it takes 2 · 0.18⁴.
+SHADOW_BESIDE = SHADOW_BYTES + 2 * 0.1813**5
 # Mean over 8³ voxels with a depth of 0.2 each: a slanted light is carried on from voxel to voxel, which is
 # the walk of w and 1 − w that widens by √(w·(1 − w)) ≤ ½ voxel a slice; within that of the sides, 1.4 voxels
 # after 8 slices, a tenth of the volume on each of two sides, light is too bright by an eighth at most.
@@ -73,6 +76,11 @@ SHADOW_PICTURE = 3e-3
 # Of a surface that fades out over 3/40 of a voxel, tents and interpolation leave less than e^(−3.5) in the
 # way of a light that starts two voxels out; with twice the voxels rims of shadows are as much softer.
 SHADOW_OWN = 0.05
+# Of a light that nothing is in the way of: rounding of two neighbours to 1/65535.
+SHADOW_STEP = 2 / 65535
+# Rms from the light to the terminator, π/2 away. Light of cosine c starts 2·c voxels above a surface; below ¼
+# of one it is carried on beside voxels inside, and half of it is lost: √(∫ (c/2)² dc / (π/2)) up to c = 1/8.
+SHADOW_GRAZED = 0.0102
 # Voxels: half of a shadow's edge after 9 slices, √(9 / 4), and half a voxel for tents.
 SHADOW_SOFT = 2.0
 
