@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import number
 from ..errors import TransferFunctionError
+from .function_files import read_function, write_function
 
 # An opacity of 1 would be an infinite extinction. 1 − 1e-6 per unit lets 1e-6 of the light through.
 MAX_OPACITY = 1 - 1e-6
@@ -120,22 +121,16 @@ class TransferFunction:
 
     def save(self, path: str | Path) -> None:
         """Write as JSON."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n")
+        write_function(path, self.to_dict())
 
     @classmethod
     def load(cls, path: str | Path) -> TransferFunction:
         """Read what `save` wrote; TransferFunctionError where it is not that."""
-        try:
-            content = json.loads(Path(path).read_text())
+
+        def of_content(content: dict[str, Any]) -> TransferFunction:
             return cls.from_rows(content["tf"], content.get("opacity_unit"))
-        except OSError as error:
-            raise TransferFunctionError(
-                f"cannot read the transfer function {path}: {error.strerror}"
-            ) from None
-        except (ValueError, KeyError, TypeError, AttributeError):
-            raise TransferFunctionError(
-                f"{path} is not a transfer function: expected JSON with tf = [[value, r, g, b, a], …]"
-            ) from None
+
+        return read_function(path, of_content, "transfer function", "tf = [[value, r, g, b, a], …]")
 
 
 def _check_points(rows: NDArray[np.float64]) -> None:

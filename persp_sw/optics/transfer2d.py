@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays import Vector, number, shown, vector
 from ..errors import TransferFunctionError
+from .function_files import read_function, write_function
 from .transfer import MAX_OPACITY
 
 Three: TypeAlias = tuple[float, float, float]
@@ -218,21 +218,12 @@ class TransferFunction2D:
 
     def save(self, path: str | Path) -> None:
         """Write as JSON."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n")
+        write_function(path, self.to_dict())
 
     @classmethod
     def load(cls, path: str | Path) -> TransferFunction2D:
         """Read what `save` wrote; TransferFunctionError where it is not that."""
-        try:
-            return cls.from_dict(json.loads(Path(path).read_text()))
-        except OSError as error:
-            raise TransferFunctionError(
-                f"cannot read the transfer function {path}: {error.strerror}"
-            ) from None
-        except (ValueError, KeyError, TypeError, AttributeError):
-            raise TransferFunctionError(
-                f'{path} is not a 2D transfer function: expected JSON with tf2d = [{{"shape": …}}, …]'
-            ) from None
+        return read_function(path, cls.from_dict, "2D transfer function", 'tf2d = [{"shape": …}, …]')
 
 
 def _fall(depth: NDArray[np.float64], soft: float) -> NDArray[np.float64]:
