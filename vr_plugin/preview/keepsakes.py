@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import logging
-from collections.abc import Callable
 from pathlib import Path
 
 import persp_sw as psw
-from persp_sw.errors import PerspSWError
 
 from ..film.flight_file import save_flight
 from .controller import Preview
@@ -16,8 +13,6 @@ from .run import Screenshots
 from .screenshot import screenshot
 from .session_file import save_session
 from .wanted import Wanted
-
-_log = logging.getLogger("persp_sw")
 
 
 class Keepsakes(Screenshots):
@@ -80,19 +75,3 @@ class Keepsakes(Screenshots):
     def _large_picture(self, wanted: Wanted) -> Path:
         path = self._free("view", self._suffix)
         return screenshot(self._pictures, wanted, path, self._size, self._samples)
-
-    def _free(self, what: str, suffix: str) -> Path:
-        number = 1
-        while (path := self._folder / f"{self._name}-{what}-{number:03d}{suffix}").exists():
-            number += 1
-        return path
-
-    def _keep(self, write: Callable[[], Path]) -> None:
-        try:
-            path = write()
-        except PerspSWError as error:  # a full disk must not end the preview
-            self._preview.say(str(error))
-            _log.warning("%s", error)
-            return
-        self.written.append(str(path))
-        self._preview.say(f"written: {path}")

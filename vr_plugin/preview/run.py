@@ -114,11 +114,17 @@ class Screenshots:
             return
         self._done = self._preview.choices.screenshots
         drawn, _ = self._pictures.draw(wanted, done)
+        self._keep(lambda: psw.images.write(self._free("view", ".png"), self._pictures.window(wanted, drawn)))
+
+    def _free(self, what: str, suffix: str) -> Path:
         number = 1
-        while (path := self._folder / f"{self._name}-view-{number:03d}.png").exists():
+        while (path := self._folder / f"{self._name}-{what}-{number:03d}{suffix}").exists():
             number += 1
+        return path
+
+    def _keep(self, write: Callable[[], Path]) -> None:
         try:
-            psw.images.write(path, self._pictures.window(wanted, drawn))
+            path = write()
         except PerspSWError as error:  # a full disk must not end the preview
             self._preview.say(str(error))
             _log.warning("%s", error)
