@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from dataclasses import asdict, fields
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 import persp_sw as psw
 from persp_sw.errors import SceneError
@@ -51,17 +51,15 @@ class SavedCamera(BaseModel):
         return Camera(Pose(self.position, self.orientation), self.distance, self.fovy)
 
 
-class SavedMarks(BaseModel):
-    """The marks that are shown; the keys of `psw.marks.MarkChoice`."""
-
-    model_config = ConfigDict(extra="forbid")
-    box: bool = False
-    axes: bool = False
-    scale_bar: bool = False
-    legend: bool = False
-    cursor: tuple[Number, Number, Number] | None = None
-    planes: bool = False
-    ruler: tuple[tuple[Number, Number, Number], tuple[Number, Number, Number]] | None = None
+# The marks that are shown: what `psw.marks.MarkChoice` says, checked.
+SavedMarks = create_model(
+    "SavedMarks",
+    __config__=ConfigDict(extra="forbid", allow_inf_nan=False),
+    **{
+        field.name: (get_type_hints(psw.marks.MarkChoice)[field.name], field.default)
+        for field in fields(psw.marks.MarkChoice)
+    },
+)
 
 
 class SavedView(BaseModel):
