@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from data_folder import DATA
@@ -20,6 +21,16 @@ def pytest_report_header() -> str:
     return (
         f"random seed {SEED}; real data: {DATA if DATA.is_dir() else f'absent ({DATA}); set PERSP_SW_DATA'}"
     )
+
+
+@pytest.fixture(autouse=True, scope="session")
+def no_types_of_tests_in_the_kernels_cache() -> Iterator[None]:
+    """A kernel called with a type that a test defines is kept by its name: the program cannot load it."""
+    yield
+    folder = Path(numba.config.CACHE_DIR)
+    kept = [path for path in folder.glob("*/*.nbi") if not path.parent.name.startswith("tests_")]
+    named = [path.name for path in kept if b"test_" in path.read_bytes()]
+    assert not named, f"compiled for types of tests: {named}; mend that and delete {folder}"
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -32,6 +32,7 @@ from persp_sw.kernels.state import (
     TILE,
     VALUE,
 )
+from persp_sw.kernels.tables import LitTable
 from persp_sw.optics.classification2d import classify
 from persp_sw.optics.shading import shade_of
 from persp_sw.optics.transfer2d import Box, TransferFunction2D
@@ -292,7 +293,8 @@ def test_light_equals_the_twin(kind, look, sample, rng):
 def test_what_shows_is_told(kind, section, rng):
     """Any lane that has a value, goes on, and finds a row that shows something."""
     seen = np.zeros(42, np.uint8)
-    table = Seen(seen, np.float32(1.0), np.float32(4.0))
+    none = np.zeros((0, 4), np.float32)
+    table = LitTable(none, np.float32(1.0), np.float32(4.0), seen, none[:, 0], none, np.zeros(0, np.uint16))
     for _ in range(300):
         lanes = lanes_of(rng)
         values = rng.integers(-8, 60, TILE) / 4 + 0.0625
@@ -304,11 +306,3 @@ def test_what_shows_is_told(kind, section, rng):
         entry = np.clip(np.floor((np.nan_to_num(values) - 1) * 4 + 1.5), 1, 41).astype(int)
         expected = (seen[entry].astype(bool) & goes_on & np.isfinite(values)).any()
         assert SHOWS[kind](TILE, table, room()[1], lanes, section) == expected
-
-
-class Seen(NamedTuple):
-    """What `shows_classified` needs of a `LitTable`."""
-
-    seen: np.ndarray
-    origin: np.float32
-    scale: np.float32

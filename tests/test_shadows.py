@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import lit_twins
 import numpy as np
@@ -34,6 +33,7 @@ from persp_sw import (
 from persp_sw._jit import kernel
 from persp_sw.kernels import attenuate, packet_lit, phong
 from persp_sw.kernels.packet import SCRATCH
+from persp_sw.kernels.scanline import Level
 from persp_sw.kernels.state import LEFT, LIGHT_SECTIONS, SECTIONS, TILE
 from persp_sw.optics.classification2d import classify
 from persp_sw.optics.shading import shade_of
@@ -233,10 +233,10 @@ def test_fog_is_right_from_any_side_and_never_too_dark(towards, rng):
 # --- Look-ups ---------------------------------------------------------------------------------------------
 
 
-class Coarser(NamedTuple):
-    """What a look-up needs of a `scanline.Level`."""
-
-    factor: np.ndarray
+def level_with(factor):
+    """Of a level a look-up needs no more than this; a type of its own would end in the program's cache."""
+    bits, voxels, none = np.zeros((1, 1, 1), np.uint64), np.zeros(1, np.uint8), np.zeros(3)
+    return Level(bits, bits, bits, bits, voxels, np.array(factor, float), none, none, none, 1, 1)
 
 
 _find_left = packet_lit._find_left
@@ -251,7 +251,7 @@ def looked_up(shade, number, y, z, x, step, low, high, factor=(1.0, 1.0, 1.0)):
     lanes = np.full(TILE * SECTIONS + int(LIGHT_SECTIONS) * TILE, np.nan, np.float32)
     light = np.uint64(TILE * SECTIONS)
     room = np.empty(SCRATCH, np.float32), np.empty(TILE, np.int32)
-    level = Coarser(np.array(factor, float))
+    level = level_with(factor)
     found_left(number, y, z, x, step, low, high, level, shade, *room, lanes, light)
     at = int(light + LEFT)
     return lanes[at : at + TILE].astype(float)
