@@ -8,7 +8,7 @@ import pytest
 import twins
 from test_composite import samples_in_packet
 from test_lit import LOOKS, rendered
-from test_packet_lit import LIGHT, level_of, lines, room
+from test_packet_lit import LIGHT, level_of, lines
 from test_packets import KINDS
 from tolerances import HIT_PART, HIT_SHARE, LIT_PIECE_TWIN, PACKET_SLOPES
 from views import DIRECTIONS, view_of
@@ -55,16 +55,14 @@ def portable_hits(path, share, table, lanes, section):
 
 
 @kernel
-def vector_slopes(start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes):
-    _vector_slopes(
-        TILE, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, HITS, SLOPES
-    )
+def vector_slopes(start, begin, end, cell, y, z, x, step, low, high, path, level, lanes):
+    _vector_slopes(TILE, start, begin, end, cell, y, z, x, step, low, high, path, level, lanes, HITS, SLOPES)
 
 
 @kernel
-def portable_slopes(start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes):
+def portable_slopes(start, begin, end, cell, y, z, x, step, low, high, path, level, lanes):
     _portable_slopes(
-        TILE, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, HITS, SLOPES
+        TILE, start, begin, end, cell, y, z, x, step, low, high, path, level, lanes, HITS, SLOPES
     )
 
 
@@ -206,7 +204,7 @@ def test_slopes_at_hit_points_equal_the_twin(kind, dtype, wide, rng):
         lines(lanes, HITS, 1)[0] = ahead
         FIND_SLOPES[kind](
             float(begin), np.uint64(begin), np.uint64(begin + width), (np.uint64(j), np.uint64(k)), y, z, x,
-            step, 0.0, 99.0, path, level_of(data, 1.0, factor), room()[1], lanes,
+            step, 0.0, 99.0, path, level_of(data, 1.0, factor), lanes,
         )  # fmt: skip
         found = lines(lanes, SLOPES, 3).copy()
         lane = np.arange(TILE)

@@ -4,9 +4,8 @@ The first hit of an opaque surface lies anywhere in a piece, and its normal is t
 piece's middle. The scalar is linear along the piece, so what the ray sees of it has its mean place where the
 integral functions say: after a share g(T) of the piece's extinction, T its optical depth,
     g(T) = 1/T − 1/(exp(T) − 1) ≈ (6 + T) / (12 + 4·T + T²)
-(½ for thin pieces, nearly 1/T for opaque ones; the fraction errs by 0.011 at most). That is one step; a
-search in the voxels, 3 … 8 bisections of the piece, gains another 0.1 dB where this gains 0.6 … 2.1
-(`docs/look.md`).
+(½ for thin pieces, nearly 1/T for opaque ones; the fraction errs by 0.011 at most). That is one step, as near
+as three bisections of the piece in the voxels (`benchmarks/hit_points.py`).
 
 Gradients have neighbours one voxel away, and every ray its own place in the packet's cells.
 """
@@ -80,38 +79,38 @@ def find_hit_points(n, path, share, table, lanes, at, section, to):
 
 
 @inlined_kernel
-def rows_around(level, j, k, begin, ahead):
+def rows_around(level, j, k, begin):
     """Where the rows around cell (j, k) are stored: its own four, eight beside them along j, then along k.
 
     Of each pair along j the lower comes first. Where the volume ends, its last row stands for those beyond.
-    Positions are as those of `packet_lit_portable.rows_at`.
+    Positions are those of the voxel before `begin`, as of `packet_lit_portable.rows_at`.
     """
     j_low, j_high = j - min(j, _ONE), min(j + _TWO, np.uint64(level.needed.shape[0] - 1))
     k_low, k_high = k - min(k, _ONE), min(k + _TWO, np.uint64(level.needed.shape[1] - 1))
     return (
-        _row(level, j, k, begin) - ahead,
-        _row(level, j + _ONE, k, begin) - ahead,
-        _row(level, j, k + _ONE, begin) - ahead,
-        _row(level, j + _ONE, k + _ONE, begin) - ahead,
-        _row(level, j_low, k, begin) - ahead,
-        _row(level, j_high, k, begin) - ahead,
-        _row(level, j_low, k + _ONE, begin) - ahead,
-        _row(level, j_high, k + _ONE, begin) - ahead,
-        _row(level, j, k_low, begin) - ahead,
-        _row(level, j + _ONE, k_low, begin) - ahead,
-        _row(level, j, k_high, begin) - ahead,
-        _row(level, j + _ONE, k_high, begin) - ahead,
+        _row(level, j, k, begin),
+        _row(level, j + _ONE, k, begin),
+        _row(level, j, k + _ONE, begin),
+        _row(level, j + _ONE, k + _ONE, begin),
+        _row(level, j_low, k, begin),
+        _row(level, j_high, k, begin),
+        _row(level, j_low, k + _ONE, begin),
+        _row(level, j_high, k + _ONE, begin),
+        _row(level, j, k_low, begin),
+        _row(level, j + _ONE, k_low, begin),
+        _row(level, j, k_high, begin),
+        _row(level, j + _ONE, k_high, begin),
     )
 
 
 @inlined_kernel
 def _row(level, j, k, begin):
-    return packed_position(level.needed, level.offsets, j, k, begin)
+    return packed_position(level.needed, level.offsets, j, k, begin) - 1
 
 
 @inlined_kernel
 def find_slopes_at(
-    n, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, hits, slopes
+    n, start, begin, end, cell, y, z, x, step, low, high, path, level, lanes, hits, slopes
 ):  # fmt: skip
     """Differences per voxel of the volume along i, j and k where the packet's rays are at `hits`.
 
@@ -126,7 +125,7 @@ def find_slopes_at(
         Sections of `lanes`: distances ahead of the plane; three lines for the differences.
     """
     t_i, t_step, t_j, towards = path[0], path[1], path[2], path[3]
-    rows = rows_around(level, cell[0], cell[1], begin, np.int64(1))
+    rows = rows_around(level, cell[0], cell[1], begin)
     voxels = level.voxels
     w_j, w_k = _F(y - np.float64(cell[0])), _F(z - np.float64(cell[1]))
     first = np.float64(begin) - 1.0

@@ -135,10 +135,10 @@ _narrow, _wide = _finder(2), _finder(4)
 
 @inlined_kernel
 def find_slopes_at(
-    n, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, hits, slopes
+    n, start, begin, end, cell, y, z, x, step, low, high, path, level, lanes, hits, slopes
 ):  # fmt: skip
     """See `hit_point.find_slopes_at`."""
-    rows = rows_around(level, cell[0], cell[1], begin, np.int64(1))
+    rows = rows_around(level, cell[0], cell[1], begin)
     numbers = (
         _F(x - start),
         _F(step),

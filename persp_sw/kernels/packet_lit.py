@@ -131,9 +131,7 @@ def _at_hit_points(
     if table.numbers[REACH] == _F(1.0):
         hits = slopes + COSINE - NEIGHBOURS
         find_hit_points(n, path, share, table, lanes, at, section, hits)
-        find_slopes_at(
-            n, start, begin, end, cell, y, z, x, step, low, high, path, level, cells, lanes, hits, slopes
-        )
+        find_slopes_at(n, start, begin, end, cell, y, z, x, step, low, high, path, level, lanes, hits, slopes)
     else:
         _slopes_on_plane(
             n, start, begin, end, cell, y, z, x, step, low, high, level, table, scratch, cells, lanes, slopes
